@@ -328,3 +328,10 @@ def test_the_command_prints_a_table_and_json(tmp_path: Path, capsys: pytest.Capt
     for option in (["--load", "6"], ["--repeated"], ["--seated", "no"]):
         assert main(["assess", str(tmp_path / "result.json"), *option]) == 2
         assert f"{option[0]} is read by the scores" in capsys.readouterr().err
+
+
+def test_a_back_of_which_nothing_is_known_does_not_count_against_a_seated_trunk(person: wb.Figure) -> None:
+    q = person.posture("sitting")
+    for work, trunk in ((None, 1), (wb.ergonomics.Work(back_supported=False), 2)):
+        assert wb.ergonomics.rula(person, q, work).left.trunk == trunk
+    assert wb.ergonomics.rula(wb.Scene(person), q).left.trunk == 2  # the scene shows that nothing is there

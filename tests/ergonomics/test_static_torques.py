@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from math import radians
 
 import numpy as np
@@ -83,3 +84,18 @@ def test_a_weaker_person_needs_a_greater_share(person: wb.Figure) -> None:
         for sex in ("male", "female")
     )
     assert woman.worst[1] > man.worst[1]
+
+
+def test_who_carries_something_mounted_keeps_sex_and_age() -> None:
+    woman = wb.load("human", sex="female", age=60)
+    hat = wb.figures.adjustable({"rim": wb.Torus(0.1, 0.01)}, tilt=(-0.1, 0.1))
+    wears = woman.mounted(hat, on="head_top", name="hat")
+    figures = (wears, pickle.loads(pickle.dumps(wears)), wears.reduced(list(woman.joints)))
+    for one in figures:
+        limits = wb.motion.Strength().limits(one)[1][one.model.joints[one.joint_id("left_elbow_flexion")].idx_v]
+        own = wb.motion.Strength().limits(woman)[1][woman.model.joints[woman.joint_id("left_elbow_flexion")].idx_v]
+        assert limits == own
+    bare, hatted = (
+        wb.ergonomics.static_torques(one, one.posture("standing"), load=20.0).worst for one in (woman, wears)
+    )
+    assert hatted == (bare[0], pytest.approx(bare[1], rel=0.02))

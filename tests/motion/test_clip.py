@@ -94,6 +94,13 @@ def test_resampling_to_a_multiple_and_back_gives_the_frames_again(human: Figure)
     assert fine[::4].dt == pytest.approx(clip.dt)
 
 
+def test_a_time_step_of_few_digits_loses_no_frame(human: Figure) -> None:
+    clip = moving(human, 9)
+    written = wb.Clip(human, clip.q, 0.0333333)
+    assert written.resampled(1 / 30).q == pytest.approx(clip.q, abs=1e-4)
+    assert len(written.resampled(0.034)) == len(clip) - 1
+
+
 def test_slices_and_joins(human: Figure) -> None:
     clip = moving(human, 9)
     assert clip[2:5].q == pytest.approx(clip.q[2:5], abs=0.0)

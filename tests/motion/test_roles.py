@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.motion.roles import matched
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import upright
+from wholebody.motion.structure import built_figure, upright
 
 LEGS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 KNOWN = {
@@ -191,3 +191,33 @@ def test_a_small_robot_with_a_stiff_trunk_is_known_by_its_axes(ahead: int, tmp_p
     assert np.abs(place).max() == pytest.approx(0.15)  # the face of its box, 0.3 m wide
     left = figure.placement(upright(figure), "LARM_1").translation
     assert left == pytest.approx([0.0, 0.2, 0.3])
+
+
+def test_a_quadruped_is_no_person(tmp_path: Path) -> None:
+    """Four limbs alike that hang from a level trunk; RR of its names is no right hip alone."""
+    links = []
+    for leg, x, y in (("FL", 0.2, 0.1), ("FR", 0.2, -0.1), ("RL", -0.2, 0.1), ("RR", -0.2, -0.1)):
+        links += [
+            ("base", f"{leg}_hip", (x, y, 0), 0.05, "x"),
+            (f"{leg}_hip", f"{leg}_thigh", (0, 0.8 * y, 0), 0.1, "y"),
+        ]
+        links += [(f"{leg}_thigh", f"{leg}_calf", (0, 0, -0.2), 0.4, "y")]
+    figure = robot(tmp_path, links)
+    assert built_figure(figure) == {}
+    with pytest.raises(wb.InputError, match="no bones of the skeleton are known to belong to robot"):
+        matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None)
+
+
+def test_a_quadruped_with_feet_is_no_person(tmp_path: Path) -> None:
+    """Its trunk is level, though each joint has one role."""
+    links = []
+    for leg, x, y in (("1", 0.2, 0.1), ("2", 0.2, -0.1), ("3", -0.2, 0.1), ("4", -0.2, -0.1)):
+        links += [("base", f"{leg}_a", (x, y, 0), 0.05, "y"), (f"{leg}_a", f"{leg}_b", (0, 0, -0.2), 0.05, "y")]
+        links += [(f"{leg}_b", f"{leg}_c", (0, 0, -0.2), 0.05, "y")]
+    assert built_figure(robot(tmp_path, links)) == {}
+
+
+def test_a_figure_with_one_freedom_is_refused() -> None:
+    figure = wb.figures.adjustable({"a": wb.Box((1, 1, 1))}, height=(0, 1))
+    with pytest.raises(wb.InputError, match="no bones of the skeleton are known"):
+        wb.retarget(still(tuple(KNOWN["SMPL-X"].split())), figure)

@@ -128,3 +128,9 @@ def test_a_person_has_distinct_answers() -> None:
     assert len(found) >= 1
     assert all(wb.assess(problem, answer.q).holds(1e-4) for answer in found)
     assert found[0].assessment.measure <= wb.solve(problem).assessment.measure * 1.01
+
+
+def test_the_first_descent_begins_however_little_time_is_left(arm: wb.Figure) -> None:
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (0.5, 0.2, 0.5))])
+    found = wb.solutions(problem, time_limit=1e-9)
+    assert found.starts == 1

@@ -218,3 +218,13 @@ def test_a_figure_is_mounted_on_another_one(write: Callable[[str], Path]) -> Non
     ):
         with pytest.raises(WholebodyError, match=said):
             read_task(write(text))
+
+
+@pytest.mark.parametrize("hand", ["left", "lefty", "anna/lefty", "anne/left"])
+def test_a_hand_of_several_people_names_its_owner(tmp_path: Path, hand: str) -> None:
+    people = "".join(f'[[figure]]\nname = "human"\ncalled = "{name}"\n' for name in ("anna", "bob"))
+    ball = '[[object]]\nname = "ball"\nshape = "sphere"\nradius = 0.05\nat = [0.4, 0.2, 1.0]\n'
+    path = tmp_path / "two.toml"
+    path.write_text(f'{people}{ball}[[goal]]\ntype = "grasp"\nhand = "{hand}"\nthing = "ball"\n')
+    with pytest.raises(WholebodyError, match=rf"key hand: '{hand}' is no hand of .*give 'anna/left' or 'anna/right'"):
+        read_task(path)

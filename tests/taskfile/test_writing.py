@@ -189,3 +189,16 @@ def test_millimetres_are_thought_of(told: Any, tmp_path: Path) -> None:
     file.write_text('[figure]\nname = "human"\n[[goal]]\ntype = "point"\nframe = "gaze"\ntarget = [800, 0, 1]\n')
     with pytest.raises(wb.FileFormatError, match=r"0\.8 if it is in millimetres"):
         wb.read_task(file)
+
+
+def test_what_is_mounted_with_something_on_it_is_to_be_mounted_one_after_the_other(tmp_path: Path) -> None:
+    def rim() -> wb.Figure:
+        return wb.figures.adjustable({"rim": wb.Torus(0.1, 0.01)}, tilt=(-0.1, 0.1))
+
+    person, goals = wb.load("human"), [wb.Point("left_palm", (0.4, 0.2, 1.0))]
+    nested = person.mounted(rim().mounted(rim(), on="rim", name="b"), on="head_top", name="a")
+    with pytest.raises(wb.InputError, match=r"mounted itself.*one figure after the other"):
+        wb.taskfile.write_task(wb.Problem(wb.Scene(nested), goals=goals), tmp_path / "nested.toml")
+    after = person.mounted(rim(), on="head_top", name="a").mounted(rim(), on="a/rim", name="b")
+    written = wb.taskfile.write_task(wb.Problem(wb.Scene(after), goals=goals), tmp_path / "after.toml")
+    assert wb.read_task(written).problem.scene.figure.joints == after.joints

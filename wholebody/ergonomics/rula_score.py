@@ -153,7 +153,7 @@ def _trunk(angles: BodyAngles, work: Work) -> int:
     # between trunk and thighs, from which a seated trunk with a back is well supported
     rests = bool(work.back_supported) and work.sits(angles) and opened >= radians(90.0)
     # upright too scores 2 "if not" well supported while seated, on the worksheet of Cornell University
-    free = work.sits(angles) and not work.back_supported
+    free = work.sits(angles) and work.back_supported is False
     score = 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
     return (1 if rests else max(score, 1 + int(free))) + turned(angles.trunk_twist, angles.trunk_lateral)
 

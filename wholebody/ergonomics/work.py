@@ -35,8 +35,8 @@ class Work(Checked):
         coupling: of hands and load: "good", "fair", "poor" or "unacceptable" (REBA).
         arms_supported: whether the arms rest on something, or the person leans.
         legs_supported: whether legs and feet are supported (RULA).
-        back_supported: whether the back of somebody seated rests on something (RULA); None to tell it from the scene,
-            and without a scene as if it did not.
+        back_supported: whether the back of somebody seated rests on something (RULA); None to tell it from the scene;
+            without a scene it is unknown then, and neither good nor bad.
         walking: whether the person walks (OWAS).
         seated: None to tell it from the posture: both thighs lie, both knees are bent, no knee is on the ground, and
             the centre of mass is behind the feet.
@@ -93,7 +93,7 @@ class Seen(NamedTuple):
 
     figure: Figure  # the person
     angles: BodyAngles  # of the body
-    work: Work  # with `seated` and `back_supported` decided
+    work: Work  # with `seated` decided, and `back_supported` where a scene tells
     seat: str  # words for how they were decided
 
 
@@ -114,7 +114,8 @@ def seen(body: Figure | Scene, q: Array, work: Work | None, what: str) -> Seen:
     words = f"{'sits' if sits else 'does not sit'}, {reason}"
     if sits and asked.back_supported is None and rest is not None:
         words += f"; the back is at {rest}"
-    back = rest is not None if asked.back_supported is None else asked.back_supported
+    shown = rest is not None if isinstance(body, Scene) and not asked.walking else None
+    back = shown if asked.back_supported is None else asked.back_supported
     return Seen(figure, angles, replace(asked, seated=sits, back_supported=back), words)
 
 

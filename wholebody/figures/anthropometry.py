@@ -62,6 +62,16 @@ class Person:
     shoes: float = field(default=0.0, repr=False)  # metres of sole below the foot
     clothing: float = field(default=0.0, repr=False)  # metres of cloth on trunk and limbs
 
+    def __repr__(self) -> str:
+        """What differs from the likely person of the sex, stature and mass, in bare skin."""
+        of, aged = dict(self.dimensions), {} if self.age is None else {"age": self.age}
+        likely = population(self.sex).likely({"stature": self.stature, "mass": self.mass} | aged)
+        names = self.stated or tuple(name for name in of if abs(of[name] - likely[name]) > 1e-6)
+        told = {"proportions": {name: round(of[name], 4) for name in names if name in of}, "age": self.age}
+        told |= {"shoes": self.shoes, "clothing": self.clothing}
+        more = "".join(f", {name}={value!r}" for name, value in told.items() if value)
+        return f"Person({self.sex!r}, stature={self.stature!r}, mass={self.mass!r}{more})"
+
     @property
     def column(self) -> str:
         """Suffix of the tables' columns for this sex: "M" or "F"."""
@@ -150,11 +160,15 @@ class Person:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on stated dimensions that the body does not have."""
-        wanted, own = dict(self.dimensions)[OVERHEAD], self.built[1][OVERHEAD]
-        if OVERHEAD not in self.stated or abs(wanted - own) <= 0.001:
-            return ()
-        return (f"{OVERHEAD} is {own:.3f} m, not {wanted:.3f} m: the shoulder rises as far as it can",)
+        """Sentences on stated dimensions that the body does not have, and on postures that clothing forbids."""
+        wanted, own, found = dict(self.dimensions)[OVERHEAD], self.built[1][OVERHEAD], list[str]()
+        if OVERHEAD in self.stated and abs(wanted - own) > 0.001:
+            found.append(f"{OVERHEAD} is {own:.3f} m, not {wanted:.3f} m: the shoulder rises as far as it can")
+        if self.clothing > 0.03:  # m: up to which named postures are free
+            found.append(
+                f"clothing of {1e3 * self.clothing:.3g} mm is so thick that parts may overlap in named postures"
+            )
+        return tuple(found)
 
     def radius(self, part: str) -> float:
         """Radius of a part with a circumference, metres."""

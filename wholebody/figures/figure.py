@@ -133,8 +133,11 @@ class Figure(checks.FixedAttributes):
         self.effort_weights[root] = np.repeat(description.root_effort, 3)[: int(root.sum())]
 
     def __repr__(self) -> str:
+        who = self._description.person
+        worn = {} if who is None else {name: getattr(who, name) for name in ("age", "shoes", "clothing")}
+        own = "".join(f"{name}={value:g}, " for name, value in worn.items() if value)
         return (
-            f"Figure({self.name!r}, detail={self.detail!r}, root={self.root!r}, "
+            f"Figure({self.name!r}, {own}detail={self.detail!r}, root={self.root!r}, "
             f"nq={self.model.nq}, nv={self.model.nv}, "
             f"pieces={self.geometry.ngeoms}, pairs={len(self.geometry.collisionPairs)})"
         )

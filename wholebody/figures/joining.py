@@ -78,7 +78,8 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
     rest = _on_model(model, posture=base.postures[0], **held)
     tested, excluded = _pairs_of_mount(model, _geometry(parts, []), parts, rest)
     known = _merged(parts)
-    description = with_values(known, postures=postures, excluded=(*known.excluded, *excluded))
+    person = base.describe().person
+    description = with_values(known, postures=postures, excluded=(*known.excluded, *excluded), person=person)
     return model, _geometry(parts, [tested]), description, _visual(parts)
 
 

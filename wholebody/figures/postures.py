@@ -17,7 +17,11 @@ from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.pieces import swept_points
 
 GAP = 0.004
-"""Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
+"""Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it.
+
+Where the thighs are as far apart as they go, the trunk rises from them: hips, pelvis and spine turn back, legs stay."""
+
+_TRUNK = {"lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"}
 
 
 def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
@@ -34,18 +38,27 @@ def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
     reach = np.array([swept_points(piece.geometry).reach for piece in figure.geometry.geometryObjects])
     pairs = pairs_of(figure.geometry)
     within, data = reach[pairs].sum(axis=1) + GAP, figure.model.createData()
-    for _ in range(45):
+    hips = [name for name in figure.joints if name.endswith("hip_flexion")]
+    pitch = degrees.get("pelvis_pitch", 0.0)
+    for turn in range(120):
         close = _close_segments(placed(figure, free, data), pairs, within)
         if not close:
             break
-        moved = {
-            name: figure.joint_values(free)[name] + math.radians(1.0)
-            for name in spread
-            if any(_moves(name, segment) for segment in close)
-        }
-        free = figure.clamp(figure.with_joints(free, moved))
+        now = figure.joint_values(free)
+        # arms that are not free after 60 degrees stay where they are
+        free_to = [name for name in spread if "hip" in name or turn < 60]
+        apart = [name for name in free_to if any(_moves(name, segment) for segment in close)]
+        if not apart:
+            break
+        free = figure.clamp(figure.with_joints(free, {name: now[name] + math.radians(1.0) for name in apart}))
+        reached = figure.joint_values(free)
+        if close & _TRUNK and any(reached[name] <= now[name] for name in apart if "hip" in name):
+            bent = [name for name in now if name.startswith("spine") and name.endswith("flexion") and now[name] > 0.0]
+            back = {name: now[name] - math.radians(1.0) for name in (*hips, *bent)}
+            free = figure.clamp(figure.with_joints(free, back))
+            pitch -= 1.0
     if figure.root == "free":
-        half = math.radians(degrees.get("pelvis_pitch", 0.0)) / 2.0
+        half = math.radians(pitch) / 2.0
         free[3:7] = 0.0, math.sin(half), 0.0, math.cos(half)
         free[2] = -lowest(figure, free, data)
     return free

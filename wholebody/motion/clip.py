@@ -28,6 +28,7 @@ MOST_FRAMES = 1_000_000  # of a clip: ten hours at 30 frames a second; more woul
 DRAWN = 8  # joints of `Clip.plot`
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
+SAME = 0.01  # of a time step: files write 0.0333333 s for a thirtieth, and their last frame is then there too
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,10 +192,10 @@ class Clip(Shown):
             InputError: a time step that is not positive, or so short that there were more than a million frames.
         """
         dt = time_step(dt, f"{self.name}: dt")
-        frames = int(np.floor(self.duration / dt + ROUNDING * len(self))) + 1
+        frames = int(np.floor(self.duration / dt + SAME)) + 1
         if frames > MOST_FRAMES:
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
-        places = [k * dt / self.dt for k in range(frames)]
+        places = [min(k * dt / self.dt, len(self) - 1.0) for k in range(frames)]
         things = {name: np.array([between(track, place) for place in places]) for name, track in self.things.items()}
         return Clip(self.figure, np.array([self._between(place) for place in places]), dt, self.name, things)
 

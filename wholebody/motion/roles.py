@@ -25,6 +25,8 @@ ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 ROLES = tuple(row["role"] for row in ROWS)
 """Parts of a body that skeletons and figures have in common. Each but the pelvis may be absent."""
 
+LIMBS = ("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand")
+
 
 class Roles(NamedTuple):
     """What has which role."""
@@ -160,11 +162,19 @@ def figure_roles(figure: Figure) -> dict[str, str]:
         # Of several joints at a hip, a shoulder or an ankle the last one is where they meet; of a wrist the first.
         if side and part and (part in ("hip", "shoulder", "ankle") or f"{side}_{part}" not in found):
             found[f"{side}_{part}"] = joint
+    # one name alone tells no limb: RR_hip_joint is of the rear legs of a quadruped
+    found = {role: joint for role, joint in found.items() if _limb_of(role) & found.keys() - {role}}
     found = built_figure(figure) | found  # joints of some are numbered, such as those of Talos
     if figure.root == "free":
         links = (*figure.segments, *figure.frames)  # a root link without a shape is no segment
         found["pelvis"] = next(name for name in links if figure.model.frames[figure.frame_id(name)].parentJoint == 1)
     return found
+
+
+def _limb_of(role: str) -> set[str]:
+    """Roles of the joints of a limb of which a role is one."""
+    side, part = role.split("_")
+    return {f"{side}_{each}" for limb in LIMBS if part in limb for each in limb}
 
 
 def column_names(names: object, figure: Figure) -> dict[str, str]:

@@ -8,6 +8,7 @@ letters in the names, else by the feet, which point forward, and by the knees, w
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from itertools import combinations
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
 
 PARTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "head")
 NEAR_JOINTS = 0.07  # of a figure's size: joints that are nearer to each other meet in one place
+UPRIGHT = 0.5  # of a trunk's length: its shoulders stand as high above its hips at least
 SHORT = 0.01  # of the skeleton's longest way: a bone that is shorter has no direction
 
 
@@ -173,7 +175,7 @@ def link_end(figure: Figure, joint: int) -> Array:
 
 
 def built_figure(figure: Figure) -> dict[str, str]:
-    """Joint by role of a figure, by its limbs at its zero; empty where it is no person's.
+    """Joint by role of a figure, by its limbs at its zero; empty where it is no person's, as a quadruped's.
 
     A wrist has the joint of the elbow where the forearm ends without one.
     """
@@ -184,10 +186,11 @@ def built_figure(figure: Figure) -> dict[str, str]:
     at, root = real.copy(), 1 if figure.root == "free" else 0
     near = NEAR_JOINTS * float(np.ptp(at[root:], axis=0).max())
     first, groups, parents = {root: 0}, [[root]], [-1]  # joint to its group
+    axes = np.asarray(data.J).reshape(6, -1)[3:]  # Pinocchio's is (6,) where there is one column
     for joint in range(root + 1, model.njoints):
         before, columns = model.parents[joint], model.joints[joint]
         own, way = first[before], at[before] - at[joint]
-        axis = data.J[3:, columns.idx_v] if columns.nv == 1 else np.zeros(3)  # none of what slides
+        axis = axes[:, columns.idx_v] if columns.nv == 1 else np.zeros(3)  # none of what slides
         along = (axis @ way) * axis
         if own and list(model.parents).count(before) == 1 and np.linalg.norm(way - along) < near:
             groups[own].append(joint)
@@ -212,12 +215,23 @@ def built_figure(figure: Figure) -> dict[str, str]:
     numbers = tuple(f"{names[k]['']} {k}" for k in range(len(names)))
     turns = np.tile(np.eye(3), (1, len(names), 1, 1))
     still = SkeletonMotion(numbers, np.array(parents), offsets, turns, np.array(places)[None], 1.0)
-    found = {
-        role: names[numbers.index(name)]
-        for role, name in built(still, stands=True).items()
-        if role.split("_")[-1] in PARTS
-    }
-    return {role: own.get(role.split("_")[-1], own[""]) for role, own in found.items()}
+    found = {role: numbers.index(name) for role, name in built(still, stands=True).items()}
+    found = {role: k for role, k in found.items() if role.split("_")[-1] in PARTS}
+    roles = {role: names[k].get(role.split("_")[-1], names[k][""]) for role, k in found.items()}
+    return roles if _is_person(roles, {role: places[k] for role, k in found.items()}) else {}
+
+
+def _is_person(joints: Mapping[str, str], places: Mapping[str, Array]) -> bool:
+    """Whether shoulders stand above hips, by their places (3,), and no joint but a forearm's has two roles.
+
+    Those of a quadruped are beside each other, and its legs end at their knees.
+    """
+    if not {"left_hip", "right_hip", "left_shoulder", "right_shoulder"} <= places.keys():
+        return False
+    hips, shoulders = (sum(places[f"{side}_{part}"] for side in ("left", "right")) for part in ("hip", "shoulder"))
+    trunk = np.asarray(shoulders - hips)
+    single = [joint for role, joint in joints.items() if not role.endswith("wrist")]
+    return len(set(single)) == len(single) and bool(trunk[2] > UPRIGHT * np.linalg.norm(trunk))
 
 
 def recognised_unit(parents: Indices, offsets: Array) -> str:

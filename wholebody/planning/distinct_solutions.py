@@ -94,7 +94,7 @@ def solutions(
         method: settings of the descents; `QP()` if left out.
         starts: most descents.
         seed: of the random postures.
-        time_limit: seconds after which it ends, the last descent too; None for no limit.
+        time_limit: seconds after which it ends, the last descent too; the first always begins. None for no limit.
 
     Raises:
         InputError: a value of the wrong kind or out of range, or the scene changed after the problem was stated.
@@ -113,8 +113,10 @@ def solutions(
     begun = descents = 0
     branches, complete, few = _branches(problem), False, problem.scene.model.nv <= FEW
     for start in _starts(problem, starts, seed) if branches is None else branches[:starts]:
-        if (left := ends - time.perf_counter()) <= 0.0:
+        left = ends - time.perf_counter()
+        if left <= 0.0 and begun:
             break
+        left = max(left, 1e-9)  # the first descent begins however long it took to get here
         timed = method if time_limit is None else replace(method, time_limit=min(left, method.time_limit or np.inf))
         answer = next(timed.minima(problem, [start]))
         begun += 1

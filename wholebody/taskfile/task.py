@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import brief, with_values
-from wholebody.base.checks import known
+from wholebody.base.checks import known, shown
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import is_file, is_folder, title_of
@@ -248,12 +248,24 @@ def _terms(contents: Contents, name: str, scene: Scene, start: NDArray[np.float6
     """Terms of one table; each is tried on the scene here so that an error can name its place in the file."""
     terms = []
     for entry in contents.tables.get(name, ()):
+        _check_hand(entry, scene)
         weight = entry.values.get("soft")
         term = entry.make() if weight is None else Soft(entry.make(), weight)
         with entry.where.named():
             term.resolve(scene, start)
         terms.append(term)
     return terms
+
+
+def _check_hand(entry: Entry, scene: Scene) -> None:
+    """Refuse a hand that does not say which of several figures has it."""
+    hand, members = entry.values.get("hand"), list(scene.figure.members)
+    if not members or not isinstance(hand, str):
+        return
+    owner, slash, own = hand.partition("/")
+    if not slash or owner not in members or own.rpartition("/")[2].split("_")[0] not in ("left", "right"):
+        named = " or ".join(f"'{name}/{side}'" for name in members[:2] for side in ("left", "right"))
+        raise entry.where.at("hand").fault(f"{shown(hand)} is no hand of one of the figures; give {named}")
 
 
 def _view(contents: Contents, scene: Scene) -> View:

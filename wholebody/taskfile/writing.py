@@ -108,6 +108,11 @@ def _with_mounts(figure: Figure, target: Path, prefix: str, named: dict[str, Any
 
 
 def _figure(figure: Figure, target: Path) -> dict[str, Any]:
+    if figure.mount is not None:
+        raise InputError(
+            f"write_task: {figure.name!r} carries something mounted and is mounted itself, which a task file "
+            "cannot say; mount one figure after the other on the first one"
+        )
     if figure.loaded_as is None:
         raise InputError(
             f"write_task: {figure.name!r} did not come from wb.load or was reduced, so a task file cannot name it; "

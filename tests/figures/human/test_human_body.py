@@ -195,3 +195,25 @@ def test_spheres_cover_the_pieces_as_far_as_the_page_says(case):
         for _, ball, _, at in spheres
     ]
     assert max(out) < 0.033
+
+
+@pytest.mark.parametrize("detail", ["capsules", "hulls", "spheres"])
+@pytest.mark.parametrize("who", [{"sex": "female"}, {"sex": "male"}, {"stature": 1.65, "mass": 110.0}])
+def test_named_postures_of_who_is_dressed_are_free(who, detail):
+    for clothing in (0.02, 0.03):
+        scene = wb.Scene(load("human", clothing=clothing, detail=detail, **who))
+        for name in scene.figure.postures:
+            q = scene.figure.posture(name)
+            assert len(scene.contacts(q, within=0.0).pair) == 0, (clothing, name)
+            if name in ("squatting", "sitting"):
+                assert scene.figure.placement(q, "left_sole").rotation[2, 2] > 0.9, (clothing, name)
+    assert not scene.figure.notes
+    assert "overlap" in load("human", clothing=0.05, **who).notes[0]
+
+
+def test_what_differs_from_the_usual_is_printed():
+    figure = load("human", sex="female", age=60, shoes=0.03, clothing=0.01)
+    assert "age=60, shoes=0.03, clothing=0.01" in repr(figure)
+    assert repr(figure.describe().person).endswith("age=60.0, shoes=0.03, clothing=0.01)")
+    assert repr(make_person()) == "Person('male', stature=1.755, mass=84.6)"
+    assert "sitting_height" in repr(make_person(proportions={"sitting_height": 0.93}))

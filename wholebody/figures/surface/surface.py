@@ -24,6 +24,8 @@ def surface_of(figure: Any) -> Surface | None:
     hands = [side for side in ("left", "right") if person and f"{side}_hand" in figure.segments]
     if person is None or ("pelvis" not in figure.segments and len(hands) != 1):
         return None
+    if any("/" in name for name in (*figure.segments, *figure.joints)):
+        return None  # a person who carries something mounted: the surface would not show that
     return _kept(person, "" if "pelvis" in figure.segments else hands[0])
 
 
