@@ -78,8 +78,9 @@ def shown(scene: wb.Scene) -> wb.Viewer:
     ],
 )
 def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
-    with pytest.warns(UserWarning, match=SAID):
+    with pytest.warns(UserWarning, match=SAID) as told:
         enter(scene, wrong)
+    assert any(warning.filename == __file__ for warning in told)  # at the line that is to be mended
 
 
 @pytest.mark.parametrize(
@@ -92,8 +93,9 @@ def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
     ],
 )
 def test_degrees_in_settings_are_said(setting, said):
-    with pytest.warns(UserWarning, match=said):
+    with pytest.warns(UserWarning, match=said) as told:
         setting()
+    assert len(told) == 1
 
 
 def test_far_out_of_the_limits_is_said_also_where_degrees_would_be(scene):

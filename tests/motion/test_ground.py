@@ -225,11 +225,12 @@ def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) 
     skate = wb.Box((0.2, 0.02, 0.04))
     floor.attach(skate, to="left_foot", name="skate", at=(0.05, 0.0, -0.09), rests_on=["left_foot", "left_toes"])
     with pytest.warns(UserWarning, match=r"skate stands up to \d+ mm inside floor.*hold_feet=False"):
-        wb.avoid(clip, floor, method="frames")
+        assert not wb.avoid(clip, floor, method="frames").report.solved
     at = human.placement(clip.q[0], "right_palm").translation
     beside = wb.Scene(human).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=at)
     with pytest.warns(UserWarning, match=r"right_hand is held up to \d+ mm inside box; leave that Hold out"):
-        wb.avoid(clip, beside, method="frames", constraints=[wb.Hold("right_palm")])
+        held = wb.avoid(clip, beside, method="frames", constraints=[wb.Hold("right_palm")])
+    assert not held.report.solved
 
 
 def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Figure) -> None:

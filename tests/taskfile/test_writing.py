@@ -117,7 +117,9 @@ def test_whose_strength_it_is_goes_round(tmp_path: Path) -> None:
 def test_the_field_of_a_look_goes_round_and_a_balance_without_forces(tmp_path: Path) -> None:
     look = wb.ergonomics.Look((1.0, 0.2, 0.3), view=wb.ergonomics.FieldOfView(horizontal=0.1, down=0.2))
     problem = wb.Problem(wb.Scene(wb.load("human")), constraints=[look, wb.ergonomics.LoadedBalance([])])
-    same(problem, wb.read_task(wb.taskfile.write_task(problem, tmp_path / "look.toml")).problem)
+    again = wb.read_task(wb.taskfile.write_task(problem, tmp_path / "look.toml")).problem
+    same(problem, again)
+    assert again.constraints[0].view == look.view  # type: ignore[attr-defined]
 
 
 def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:

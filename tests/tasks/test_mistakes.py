@@ -75,8 +75,9 @@ def test_what_is_hardly_meant_is_told() -> None:
         tasks.Orientation("tip", (1.0, 0.0, 0.0, 0.0))
     with pytest.warns(UserWarning, match="quaternions are x, y, z, w"):
         tasks.Frame("tip", (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    with pytest.warns(UserWarning, match="target is 98.7 m away; .* centimetres"):
+    with pytest.warns(UserWarning, match="target is 98.7 m away; .* centimetres") as said:
         tasks.Point("tip", (55.0, -20.0, 79.5))
+    assert len(said) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         tasks.Frame("tip", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))

@@ -326,9 +326,8 @@ def soles(
         vectors = motion.positions[:, end] - motion.positions[:, start]
         heading, own = vectors[flat] * (1.0, 1.0, 0.0), places[toe] - places[ankle]
         along = np.linalg.norm(heading, axis=1)
-        if not flat.any() or along.min() < 0.5 * np.median(
-            np.linalg.norm(vectors, axis=1)
-        ):  # a hanging foot says nothing
+        length = np.median(np.linalg.norm(vectors, axis=1))
+        if not flat.any() or along.min() < 0.5 * length:  # a hanging foot says nothing
             continue
         rise = float(own[2] / np.linalg.norm(own))
         wanted = heading / along[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)

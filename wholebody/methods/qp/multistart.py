@@ -264,7 +264,7 @@ class Multistart:
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _starts_for_measure(self, count: int) -> Iterable[Array]:
-        """For `count` minima the start and random postures (nq,); for none two around things that are dear."""
+        """For `count` minima the start and random postures (nq,); for none two that lead around things."""
         here, tolerance, most = self._start, self.settings.tolerance, self._at_most(SEARCH.probe_programs)
         if count:
             rng = np.random.default_rng([self.settings.seed, count])
