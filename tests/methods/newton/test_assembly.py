@@ -218,6 +218,17 @@ def test_the_nearest_ring_is_nearer_than_what_least_steps_find() -> None:
     assert way(nearest, start) < way(stepped, start) - 1e-6
 
 
+def test_the_nearest_place_keeps_to_limits_and_shapes() -> None:
+    made = Assembly().body("bob", (1.0, 0.2, 0.0), size=1e-3, shape=wb.Sphere(0.05))
+    made.spherical("world", "bob", at=(0, 0, 0))
+    made.on_plane("bob", (0, 0, 0), normal=(0, 0, 1), through=(0, 0, 0.6), side="above")
+    made.add(wb.Box((3.0, 1.0, 3.0)), name="wall", at=(0.0, -0.25, 0.0))  # its face is at y = 0.25
+    answer = made.solve(tolerance=1e-9, nearest=True)
+    x, y, z = answer.placements["bob"].translation
+    assert (y, z) == pytest.approx((0.3, 0.6), abs=1e-6)
+    assert x == pytest.approx(np.sqrt(1.04 - 0.09 - 0.36), abs=1e-6)
+
+
 def _bar(x: float, z: float, angle: float) -> pin.SE3:
     """Placement of a bar that begins at (x, z) and rises from x by an angle; turns about y lower z."""
     return pin.SE3(pin.rpy.rpyToMatrix(0.0, -angle, 0.0), np.array((x, 0.0, z)))

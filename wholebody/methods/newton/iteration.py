@@ -240,8 +240,8 @@ class Iteration:
         if measures == "lower":
             asked[self.objective] = self.residual[self.objective] / (1.0 + damping / STEPS.first_damping)
         diagonal[self.objective] = FREE if measures == "ignore" else 1.0 / self.system.stiffness[self.objective]
-        lowered = self.anchor is not None and measures == "lower"
-        gradient = self.system.weight * (self.x - self.anchor) if lowered else np.zeros_like(self.x)
+        anchor = self.x if self.anchor is None or measures != "lower" else self.anchor
+        gradient = self.system.weight * (self.x - anchor)
         rows, phi = self.one_sided, self.residual[self.one_sided]
         base = diagonal[rows]
         at = np.zeros_like(self.x)
