@@ -145,7 +145,9 @@ class Descents:
             # What blocks an end may leave postures of its branch free.
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
             for each in (branches or self._branches()).cheaper(most) if held else ():
-                # a sample a little beyond limits was clamped to them, and does not meet the goals
+                if not self._is_free(self.chain.posture(each, self.asked.at)):
+                    continue
+                # it is only near to the goals, or was a little beyond limits and clamped to them
                 values = self._beside(float(each[self.chain.held]), each)
                 if values is not None and self._is_free(self.chain.posture(values, self.asked.at)):
                     return self._to_the_edge(values)
