@@ -190,7 +190,7 @@ def _pairs(own: Mapping[str, Array], other: Mapping[str, Array], whole: Populati
     }
 
     def shares(of: Mapping[str, Array]) -> Array:
-        below = np.stack([of[name][:, None] <= ends[name] for name in ends]).astype(float)  # dimension, person, quartile
+        below = np.stack([of[name][:, None] <= ends[name] for name in ends]).astype(float)
         both = np.einsum("ipa,jpb->ijab", below, below) / below.shape[1]
         return np.asarray(both[np.triu_indices(len(ends), 1)])
 

@@ -25,9 +25,9 @@ parts are by name::
     </wholebody>
 
 A posture gives the joints that are not at zero, in radians and metres, and the placement of the root: x, y, z and the
-quaternion x, y, z, w. The person is whose body it is: sizes in metres and kilograms, the age in years if it is known, and
-the dimensions that were stated. Pieces have the names of their ``<collision>`` elements. All pairs are tested except the untested
-ones and those whose pieces are on one joint.
+quaternion x, y, z, w. The person is whose body it is: sizes in metres and kilograms, the age in years if it is known,
+and the dimensions that were stated. Pieces have the names of their ``<collision>`` elements. All pairs are tested
+except the untested ones and those whose pieces are on one joint.
 """
 
 from __future__ import annotations
@@ -61,7 +61,6 @@ from wholebody.figures.motion_ranges import (
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
-
 
 SIZES = ("stature", "mass", "age", "shoes", "clothing")
 """Numbers of a person that a file has, those that are known."""
