@@ -318,14 +318,13 @@ COLLISION = '<collision><origin xyz="0.06 0 0"/><geometry><sphere radius="0.03"/
     ],
     ids=["own pieces", "drawn", "drawn cylinder", "mass alone", "pieces of a fixed child", "bare frame"],
 )
-@pytest.mark.parametrize("joints", ["all", "shoulder"])
 def test_a_link_at_a_fixed_joint_touches_with_its_surface(
-    tmp_path: Any, wrist: str, hand: str, part: str, along: float, radius: float, joints: str
+    tmp_path: Any, wrist: str, hand: str, part: str, along: float, radius: float
 ) -> None:
     """By its pieces, by what is drawn of it, or by what moves with it; a frame without a body by its origin."""
     path = tmp_path / "arm.urdf"
     path.write_text(ARM.format(wrist=wrist, hand=hand))
-    figure = wb.load(path).reduced(joints)
+    figure = wb.load(path).reduced("shoulder")
     scene = wb.Scene(figure).add(wb.HalfSpace(offset=-0.4), name="table")
     found = wb.solve(wb.Problem(scene, goals=[wb.Touch(part, "table")]))
     assert found.status == "solved", found.message
@@ -366,7 +365,7 @@ def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
 
 
-@pytest.mark.parametrize("percentile", [5, 50, 95])
+@pytest.mark.parametrize("percentile", [5, 95])
 def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_any_start(percentile: int) -> None:
     # The ankle of a small woman who stands is as near to the floor as a knee that is thick.
     woman = wb.load("human", sex="female", percentile=percentile)
@@ -380,9 +379,8 @@ def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_a
         assert woman.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(15.0))
 
 
-@pytest.mark.parametrize("sex", ["female", "male"])
-def test_a_foot_stands_on_a_rung_with_the_middle_of_its_sole(sex: str) -> None:
-    person, level = wb.load("human", sex=sex), (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+def test_a_foot_stands_on_a_rung_with_the_middle_of_its_sole() -> None:
+    person, level = wb.load("human", sex="female"), (0.5**0.5, 0.0, 0.0, 0.5**0.5)
     scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Cylinder(0.015, 0.5), name="rung", at=(0.3, -0.1, 0.3, *level))
     stands = [wb.Stand("floor", feet=["left_foot"]), wb.Stand("rung", feet=["right_foot"], balance=False)]
