@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask, cross
@@ -34,6 +36,15 @@ class Sleepers:
     def count(self) -> int:
         """How many bodies sleep."""
         return int(self._asleep().sum())
+
+    def kept(self) -> tuple[Any, ...]:
+        """What `restore` needs."""
+        return self._slow_for.copy(), self._island.copy(), self._touched, self._position, self._rotation
+
+    def restore(self, kept: tuple[Any, ...]) -> None:
+        """Go back to where `kept` was called."""
+        slow_for, island, self._touched, self._position, self._rotation = kept
+        self._slow_for, self._island = slow_for.copy(), island.copy()
 
     def _asleep(self) -> Mask:
         return self._state.pieces.dynamic & ~self._state.bodies.moving
