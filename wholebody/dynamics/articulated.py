@@ -111,20 +111,19 @@ class Articulated:
         The engine sees the figure as something that is moved. Where it finds an impact with it that the program of
         the figure's contacts did not foresee, as that turns on the way, the step is made again, and ends there.
         """
-        engine = self._engine
         figure, impulses = (self.q, self.velocity), self.impulses.copy()
-        bodies = () if engine is None else engine.kept()
+        back = None if self._engine is None else self._engine.way_back()
         most = time
         while True:
             done, frame = self._attempt(most, time, aim, steady, moved, segments)
             hits = () if frame is None else (e for e in frame.events if e.speed > BOUNCE)
             met = [e.time for e in hits if not segments.keys().isdisjoint((e.first, e.second))]
-            if not met or done <= SHORTEST or engine is None:
+            if not met or done <= SHORTEST or back is None:
                 self.frames += [] if frame is None else [frame]
                 return done
             most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
             (self.q, self.velocity), self.impulses = figure, impulses.copy()
-            engine.restore(bodies)
+            back()
 
     def _attempt(
         self, time: float, planned: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]
@@ -191,7 +190,7 @@ class Articulated:
         touched = {name for both in met for name in both if name in names}
         owners, gap = met, rows.gap[kept]
         if touched and engine is not None:
-            whose, others = engine.contacts(touched)
+            whose, others = engine.contacts(sorted(touched))
             owners, gap = met + whose, np.concatenate([gap, np.maximum(others.gap, SKIN)])
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
         bodies = sorted({name for both in owners for name in both if name in names})

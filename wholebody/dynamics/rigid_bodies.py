@@ -10,8 +10,7 @@ part of its program.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -220,21 +219,23 @@ class RigidBodies:
     def contacts(self, names: Collection[str]) -> tuple[list[tuple[str, str]], ContactPoints]:
         """Points at which bodies with these names, and those that touch them in turn, can touch other things: whose."""
         linked = np.zeros(len(self.names), dtype=bool)
-        linked[[self._number(name) for name in names]] = True
+        linked[[self._number(name) for name in checks.listed(names, "names", "['ball']")]] = True
         found = self._finder.points(self._near).linked(linked, self._pieces.dynamic, self._things, 2.0 * SKIN)
         return [(self.names[a], self.names[b]) for a, b in found.bodies.tolist()], found
 
-    def kept(self) -> tuple[Any, ...]:
-        """What `restore` needs to take frames back."""
-        moving = self.state.bodies.moving.copy()
-        return self.state.copies(), moving, self._old, self._falling, self._sleepers.kept(), self._pushed, self.time
+    def way_back(self) -> Callable[[], None]:
+        """A function that takes back what is advanced from now on."""
+        state, sleepers = self.state, self._sleepers.way_back()
+        copies, moving = state.copies(), state.bodies.moving.copy()
+        old, falling, pushed, now = self._old, self._falling, self._pushed, self.time
 
-    def restore(self, kept: tuple[Any, ...]) -> None:
-        """Go back to where `kept` was called."""
-        copies, moving, self._old, self._falling, sleepers, self._pushed, self.time = kept
-        self.state.restore(copies)
-        self.state.bodies.moving[:] = moving
-        self._sleepers.restore(sleepers)
+        def back() -> None:
+            state.restore(copies)
+            state.bodies.moving[:] = moving
+            self._old, self._falling, self._pushed, self.time = old, falling, pushed, now
+            sleepers()
+
+        return back
 
     # ---- a step
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -37,14 +37,15 @@ class Sleepers:
         """How many bodies sleep."""
         return int(self._asleep().sum())
 
-    def kept(self) -> tuple[Any, ...]:
-        """What `restore` needs."""
-        return self._slow_for.copy(), self._island.copy(), self._touched, self._position, self._rotation
+    def way_back(self) -> Callable[[], None]:
+        """A function that takes back what happens from now on."""
+        kept = self._slow_for.copy(), self._island.copy(), self._touched, self._position, self._rotation
 
-    def restore(self, kept: tuple[Any, ...]) -> None:
-        """Go back to where `kept` was called."""
-        slow_for, island, self._touched, self._position, self._rotation = kept
-        self._slow_for, self._island = slow_for.copy(), island.copy()
+        def back() -> None:
+            self._slow_for, self._island = kept[0].copy(), kept[1].copy()
+            self._touched, self._position, self._rotation = kept[2:]
+
+        return back
 
     def _asleep(self) -> Mask:
         return self._state.pieces.dynamic & ~self._state.bodies.moving
