@@ -6,12 +6,13 @@ A step dq minimises, over joint limits, the greatest motion of a frame, reach co
 
 with p the points and B their differences along bones, so that a body is moved as a whole at no cost to its bones; R
 orientations; h points that are held; q* a posture to stay near to. Contacts are rows ``gap + J dq >= clearance`` of all
-pairs that are near, relaxed at a high price. Joint limits hold exactly, cones to second order of the last step.
+pairs that are near, relaxed at a high price, and of those at given places of motions to other frames, at a lower one.
+Joint limits hold exactly, cones to second order of the last step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import daqp
@@ -27,6 +28,7 @@ STEP = 0.6  # rad: largest change of a joint in one step; beyond it the linearis
 CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
 DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
 WITHIN, CLEARANCE = 0.06, 5e-4  # m: nearer pairs have rows; distance that they keep
+PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
 LEAST_LEVER = 0.1  # m
@@ -43,6 +45,15 @@ class Goals(NamedTuple):
     held_weights: Array  # (h, 3) weight of each, along the axes of the world; 0 for none
     posture: Array  # (nq,) a posture to stay near to
     posture_weights: Array  # (nv,) weight of each difference from it, metres per radian
+
+
+class Midway(NamedTuple):
+    """A place on the motion from a posture to that of a frame beside it."""
+
+    other: Array  # (nq,) the posture beside it
+    share: float  # of the way to that
+    part: float  # of what is missing there, that the posture is to give way
+    weight: float  # of what is missing: 1 is that of a bone
 
 
 class Layout(NamedTuple):
@@ -116,9 +127,9 @@ class Fitter:
         self._state.update(q)
         return bool((self._cone_angles() < -CONE_SLACK).any())
 
-    def overlaps(self, q: Array) -> bool:
-        """Whether a pair overlaps at a posture (nq,) by more than the clearance that rows ask for."""
-        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) < -CLEARANCE)
+    def overlaps(self, q: Array, depth: float = CLEARANCE) -> bool:
+        """Whether a pair overlaps at a posture (nq,) by more than a depth, metres."""
+        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) < -depth)
 
     def cost(self, q: Array, goals: Goals) -> float:
         """Half the sum of the squared weighted errors."""
@@ -128,7 +139,14 @@ class Fitter:
         return 0.5 * float(errors @ errors + posture @ posture)
 
     def step(
-        self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
+        self,
+        q: Array,
+        goals: Goals,
+        *,
+        damping: float = DAMPING,
+        among: bool = True,
+        most: Array | None = None,
+        midway: Sequence[Midway] = (),
     ) -> Array:
         """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`."""
         self._state.update(q)
@@ -154,6 +172,13 @@ class Fitter:
             found = self._workspace.rows.rows(near, CLEARANCE)
             limits.append(self._state.rows(found.wrench, found.second, found.first))
             least.append(np.minimum(CLEARANCE - found.gap, PUSH))
+        for other, share, part, weight in midway:
+            self._state.update(pin.interpolate(self.model, q, other, share))
+            found = self._workspace.rows.rows(self._workspace.proximity.query(self._state.data, PASSING), SPARE)
+            pull = weight * RELAXED**0.5  # what a row is multiplied by, its price is by the square of
+            missing = SPARE - found.gap
+            limits.append(pull * (1.0 - share) * self._state.rows(found.wrench, found.second, found.first))
+            least.append(pull * np.minimum(np.where(missing > 0.0, part, 1.0) * missing, PUSH))
         among_rows, low = np.concatenate(limits), np.concatenate(least)
         sense = np.zeros(len(lower) + len(low), dtype=np.int32)
         sense[len(lower) :] = SOFT
