@@ -21,6 +21,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
+from wholebody.motion.held_points import HeldPoint
+from wholebody.motion.retarget_targets import LIMBS, has_trunk, known_bones
+from wholebody.motion.roles import Roles
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.residual_kernel import cones as cone_angles
 
@@ -33,6 +36,9 @@ PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
 LEAST_LEVER = 0.1  # m
 WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
+ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
+BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
+TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the program digits
 
 
@@ -190,6 +196,16 @@ class Fitter:
             return q
         return self.figure.clamp(np.asarray(pin.integrate(self.model, q, np.asarray(x))))
 
+    def reached(self, before: Array | None, q: Array, most: Array) -> Array:
+        """The posture nearest to q (nq,) that is at most (nv,) from the posture before in time."""
+        q = self.figure.clamp(q)
+        if before is None:
+            return q
+        way = np.asarray(pin.difference(self.model, before, q))
+        if (np.abs(way) <= most).all():
+            return q
+        return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -most, most)))
+
     def descend(self, q: Array, goals: Goals, iterations: int) -> tuple[Array, float]:
         """The posture (nq,) of least cost that a descent from q finds, without regard to contacts, and its cost."""
         q, damping = self.figure.clamp(q), DAMPING
@@ -261,3 +277,32 @@ def levers(figure: Figure) -> Array:
         found[:3] = 1.0
         found[:6] *= np.repeat(WHOLE, 3)
     return found
+
+
+def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
+    """The bones between points of roles, the anchor or what else says where they are, and orientations of roles."""
+    own, place = roles.places(figure), {role: np.eye(len(points))[k] for k, role in enumerate(points)}
+    for part in ("hip", "shoulder"):
+        if {f"left_{part}", f"right_{part}"} <= place.keys():
+            place[f"{part}s"] = 0.5 * (place[f"left_{part}"] + place[f"right_{part}"])
+    trunk = [
+        ("left_hip", "right_hip"),
+        ("hips", "shoulders"),
+        ("left_shoulder", "right_shoulder"),
+        ("shoulders", "head"),
+    ]
+    limbs = [ends for limb in LIMBS for side in ("left", "right") for ends in known_bones(limb, side, points)]
+    pairs = [ends for ends in trunk + limbs if set(ends) <= place.keys()]
+    rows = [place[end] - place[start] for start, end in pairs]
+    weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
+    if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
+        rows.append(place["hips"])
+        weights.append(ANCHOR)
+    else:  # what is known says where it is
+        rows += [place[role] for role in points]
+        weights += [1.0] * len(points)
+    return Layout(
+        [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
+        np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
+        [(point.joint, point.place, point.base) for point in held],
+    )  # fmt: skip

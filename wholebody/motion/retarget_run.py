@@ -28,13 +28,12 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.faults import DIP
-from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.holds import Holds
-from wholebody.motion.posture_fit import Fitter, Goals, Layout, Midway, levers
-from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
+from wholebody.motion.posture_fit import Fitter, Goals, Midway, layout_of, levers
+from wholebody.motion.retarget_targets import Targets, Wanted, has_trunk, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
-from wholebody.motion.windows import normal
+from wholebody.motion.windows import leaning, normal
 from wholebody.scene.workspace import Workspace
 
 FIRST, FREE, FORWARD, SWEEP = (
@@ -51,7 +50,6 @@ STARTS = 4  # how often the first frame is solved, each time from where soles ca
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
 FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
-ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.055  # s^0.5, weight of a change of the deviation in the first pass, over the root of the time step
 BEND = 0.067  # s², weight of an acceleration of the deviation in sweeps, in metres that limbs move
@@ -64,8 +62,6 @@ LATE = 1.3  # omega of sweeps that look at motions between frames: earlier ones 
 MENDED = 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
-BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
-TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 
 
 class Run:
@@ -85,7 +81,7 @@ class Run:
         self.free = list[Array]() if free is None else free
         self.figure, self.model, self.dt, self.holds = figure, figure.model, dt, holds
         points, turns = parts_of(targets, roles)
-        self.fitter = Fitter(figure, _layout(points, turns, roles, figure, holds.points if holds else []), workspace)
+        self.fitter = Fitter(figure, layout_of(points, turns, roles, figure, holds.points if holds else []), workspace)
         self.hips = [k for k, role in enumerate(points) if role.endswith("hip")] or [0]
         self.led = figure.root == "free" and has_trunk(roles.joints)
         self.upright = upright(figure)
@@ -272,10 +268,7 @@ class Run:
         """
         half, last = len(weights) // 2, self._came - 1
         away = np.arange(max(-half, -k // span), (min(half, (last - k) // span) if self.ended else half) + 1)
-        near = weights[away + half]
-        sums = near.sum(), near @ away, near @ away**2  # beside an end the line leans
-        size = sums[0] * sums[2] - sums[1] ** 2
-        near = near * (sums[2] - sums[1] * away) / size if size > 0.0 else near / sums[0]
+        near = leaning(weights[away + half], away)
         return np.asarray(near @ np.array([values[k + span * j] for j in away.tolist()]))
 
     def _alone(self, k: int) -> None:
@@ -301,13 +294,13 @@ class Run:
         shift = pin.XYZQUATToSE3(free[:7]).rotation @ shift if self.figure.root == "free" else shift
         before = np.asarray(pin.integrate(model, self._free[k - span], self._first[k - span])) if k else None
         self.fitter.see(holds.moved(k))
-        q = self._reached(before, reference, span)
+        q = self.fitter.reached(before, reference, span * self.most)
         for _ in range(1 if k else STARTS):
             held = holds.goals(k, self._paths, shift, span=span)
             goals = self._goals(k, reference, CHANGE / dt**0.5 * self.levers, held)
             q = self._settled(q, goals, before)
             if holds.lost(k, q, self.fitter.held(q), held):
-                q = self._settled(self._reached(before, reference, span), goals, before)
+                q = self._settled(self.fitter.reached(before, reference, span * self.most), goals, before)
             holds.touch(k, q, self.fitter.held(q), held)
             holds.landed(k, self.fitter.held(q), held, span)
         self._first[k] = np.asarray(pin.difference(model, free, q))
@@ -350,10 +343,7 @@ class Run:
         )
 
     def _swept(self, k: int, omega: float, span: int, start: Array | None = None) -> None:
-        """Solve a frame anew between those `span` and twice as many frames before and after it.
-
-        From `start` it stays within reach of the next one too, which may be solved no more.
-        """
+        """Solve a frame anew between those `span` and twice as far away; from `start` in reach of the next too."""
         assert self.holds is not None
         if k % span:
             return
@@ -367,7 +357,7 @@ class Run:
         held = self._held[k][1]
         goals = self._goals(k, reference, BEND / (span * self.dt) ** 2 * self.levers, held)
         before, after = self._found[k - span] if k else None, None if start is None else self._found.get(k + 1)
-        q = self._reached(before, reference if start is None else start, span)
+        q = self.fitter.reached(before, reference if start is None else start, span * self.most)
         midway = self._midway(k) if span == 1 and omega < LATE else []
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
@@ -408,42 +398,3 @@ class Run:
             other = self.reach - pin.difference(self.model, after, q)
             room = np.stack([np.maximum(room[0], other[0]), np.minimum(room[1], other[1])])
         return room
-
-    def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:
-        """The posture nearest to q (nq,) that joints reach from the posture before in time."""
-        q = self.figure.clamp(q)
-        if before is None:
-            return q
-        way = np.asarray(pin.difference(self.model, before, q))
-        most = span * self.most
-        if (np.abs(way) <= most).all():
-            return q
-        return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -most, most)))
-
-
-def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
-    own, place = roles.places(figure), {role: np.eye(len(points))[k] for k, role in enumerate(points)}
-    for part in ("hip", "shoulder"):
-        if {f"left_{part}", f"right_{part}"} <= place.keys():
-            place[f"{part}s"] = 0.5 * (place[f"left_{part}"] + place[f"right_{part}"])
-    trunk = [
-        ("left_hip", "right_hip"),
-        ("hips", "shoulders"),
-        ("left_shoulder", "right_shoulder"),
-        ("shoulders", "head"),
-    ]
-    limbs = [ends for limb in LIMBS for side in ("left", "right") for ends in known_bones(limb, side, points)]
-    pairs = [ends for ends in trunk + limbs if set(ends) <= place.keys()]
-    rows = [place[end] - place[start] for start, end in pairs]
-    weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
-    if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
-        rows.append(place["hips"])
-        weights.append(ANCHOR)
-    else:  # what is known says where it is
-        rows += [place[role] for role in points]
-        weights += [1.0] * len(points)
-    return Layout(
-        [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
-        np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
-        [(point.joint, point.place, point.base) for point in held],
-    )  # fmt: skip
