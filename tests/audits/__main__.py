@@ -40,7 +40,7 @@ def newton(arguments: argparse.Namespace) -> None:
     repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
     facts, many = machine(), 10 * repeats
     paper = [newton.paper_row(many), newton.drag_of_assembly_row(many)]
-    solves = [*paper, newton.nearest_row(many), *newton.loop_rows(many)]
+    solves = [*paper, *newton.loop_rows(many)]
     agreements = newton.agreement_rows(many)
     drags = [newton.drag_row(frames, contacts) for contacts in (False, True)]
     linear = list(newton.linear_rows(sizes, repeats))
@@ -171,27 +171,6 @@ def loads(arguments: argparse.Namespace) -> None:
         write_rows(arguments.out / "loads.csv", facts, rows)
         print(f"{row.clip}, {row.equipment}, {row.way}", flush=True)
     publish("loads", loads.report(rows, facts), arguments, page=None)
-
-
-@measuring(
-    "clip-constants",
-    "what each constant of the methods of `wb.avoid` is worth",
-    "Halve and double one constant at a time, and free clips that need no recordings.",
-    listed("--only", "modules of wholebody.motion (default: all that are looked at)", "MODULE"),
-)
-def clip_constants(arguments: argparse.Namespace) -> None:
-    """Measure and report; --quick takes two clips."""
-    from tests.audits import clip_constants as ablated
-    from wholebody.figures import load
-
-    only = chosen(arguments.only, ablated.USED, "--only")
-    cases = ablated.CASES[-2:] if arguments.quick else ablated.CASES
-    facts, rows = machine(), ablated.ablation(load("human"), print, cases, only)
-    shown = [row for row in rows if ablated.matters(row)]
-    unnoticed = sorted({row.case for row in rows} - {row.case for row in shown})
-    about = "Constants of `wb.avoid`, halved and doubled on clips: changes, summed over the cases."
-    text = report(about, {"": shown}, facts, [f"changes nothing: {name}" for name in unnoticed])
-    publish("clip-constants", text, arguments, facts=facts, tables={"clip-constants": rows}, page=None)
 
 
 @measuring(
@@ -331,7 +310,7 @@ def attack(arguments: argparse.Namespace) -> int:
     return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C
 
 
-COMMANDS = (newton, qp, human, postures, regress, loads, clip_constants, ablation, robots, plans, attack)
+COMMANDS = (newton, qp, human, postures, regress, loads, ablation, robots, plans, attack)
 
 
 def main(words: Sequence[str] | None = None) -> int:
