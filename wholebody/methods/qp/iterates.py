@@ -90,7 +90,7 @@ class Stage:
     note: str = ""  # what to call the programs in the trace
 
     def iterate_at(self, q: Array, within: float, longest: float = np.inf, *, planes: bool = False) -> Iterate:
-        """A posture (nq,) with the rows of pairs within a distance, metres, and supporting planes; UndefinedTermError."""
+        """A posture (nq,) with the rows of pairs within a distance, metres; UndefinedTermError."""
         at = self.shared.lineariser.at(q, within, planes=planes)
         rows = self.shared.subproblem.rows(at)
         return Iterate(at, rows, self.shared.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
