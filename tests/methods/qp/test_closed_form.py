@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+import scipy.optimize
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
@@ -238,3 +239,41 @@ def test_descents_of_an_arm_whose_axes_nearly_cross_begin_near_all_its_postures(
         end = figure.placement(wb.solve(problem).q, "tool")
         np.testing.assert_allclose(end.homogeneous, place.homogeneous, atol=2e-5)
     assert near >= 15
+
+
+@pytest.mark.parametrize("name", ["panda", "gen3"])
+def test_where_an_end_is_blocked_nothing_free_beside_the_answer_takes_less_effort(name):
+    """Of an arm with a closed form, and of one that is only near to it: along the curve on which the tool rests."""
+    figure, start = known_arm(name)
+    rng, among, followed = np.random.default_rng(7), wb.Scene(figure), 0
+    among.add(wb.Box((0.5, 0.9, 0.03)), name="table", at=(0.55, 0.0, 0.35))
+    lower, upper, tool = *np.clip([figure.limits.lower, figure.limits.upper], -2.0, 2.0), figure.frame_id("tool")
+    for _ in range(80):
+        place = figure.placement(rng.uniform(lower, upper), "tool")
+        goals = [wb.Frame("tool", place)]
+        alone = wb.solve(wb.Problem(wb.Scene(figure), start, goals=goals)).assessment.measure
+        answer = wb.solve(problem := wb.Problem(among, start, goals=goals))
+        if not answer.solved or answer.assessment.measure < 1.01 * alone:
+            continue  # nothing blocks it
+        followed += 1
+        assert not answer.programs  # it is found by the chain alone
+        for sign in (1.0, -1.0):
+            q, before = answer.q, None
+            for _ in range(15):
+                jacobian = pin.computeFrameJacobian(figure.model, figure.model.createData(), q, tool, pin.LOCAL)
+                along = np.linalg.svd(jacobian)[2][-1]
+                along = sign * along if before is None else along * np.sign(before @ along)
+                before = along
+
+                def off(x, q=q, along=along, place=place):
+                    away = pin.log6(figure.placement(x, "tool").actInv(place)).vector
+                    return [*away, along @ (x - q) - 0.02]
+
+                q = scipy.optimize.root(off, q + 0.02 * along).x
+                judged = wb.assess(problem, q)
+                if not judged.holds(1e-6):
+                    break
+                assert judged.measure > answer.assessment.measure * (1.0 - 1e-4)
+        if followed == 3:
+            break
+    assert followed == 3

@@ -129,11 +129,9 @@ class Descents:
         """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
         if not self.settings.restarts:
             return self._ended(self.start[None].copy(), 1)
-        _, exact, finite, enough = self.rule[:4]
-        if first is None and self.rule.guided:
-            first = self._first_ended()
-        if exact and first is not None:
-            ends, found = first
+        guided, held, finite, enough = self.rule[:4]
+        if guided:
+            ends, found = first or self._first_ended()
             met, branches = self._chosen(ends, found), None
             if met is None and not self.control.over:
                 branches = self._branches()
@@ -146,9 +144,11 @@ class Descents:
                 return met
             # What blocks an end may leave postures of its branch free.
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
-            for each in (branches or self._branches()).cheaper(most):
-                # a sample a little beyond limits was clamped to them, and does not meet the goals
-                values = self.chain.beside(self.asked.goals, self.asked.nearest, float(each[self.chain.held]), each)
+            for each in (branches or self._branches()).cheaper(most) if held else ():
+                if not self._is_free(self.chain.posture(each, self.asked.at)):
+                    continue
+                # it is only near to the goals, or was a little beyond limits and clamped to them
+                values = self._beside(float(each[self.chain.held]), each)
                 if values is not None and self._is_free(self.chain.posture(values, self.asked.at)):
                     return self._to_the_edge(values)
             if met is not None:
@@ -161,8 +161,8 @@ class Descents:
                 (ends, found), first = first, None
                 met = self._chosen(ends, found)
                 if met is None and not self.control.over:
-                    others = seeds if self.rule.guided else seeds[len(ends) :]
-                    met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
+                    left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
+                    met = self._ended(left, enough, others=True)
             if met is not None or self.control.over:
                 return met
         return None
@@ -241,10 +241,11 @@ class Descents:
 
     def _along(self, met: Met | None) -> Met | None:
         """An end near singular postures, which programs lead to no least effort from, led there along its branch."""
-        if met is None or met.stationary or not (self.rule.exact and self.measured):
+        if met is None or met.stationary or not ((self.rule.held or self.rule.finite) and self.measured):
             return met
         at = self.chain.angles(met.q)
-        values = None if self.rule.finite else self.chain.along(self.asked.goals, self.asked.nearest, at)
+        goals, _, nearest, _ = self.asked
+        values = None if self.rule.finite else self.chain.along(goals, nearest, at)
         ended = None if values is None else self._ended(values[None], 1)
         if ended is not None and self._effort(ended.q) <= self._effort(met.q):
             met = with_values(met, q=ended.q)
@@ -257,17 +258,22 @@ class Descents:
         blocked = chain.along(goals, nearest, values) if self.measured else None
         if blocked is None:
             return Met(chain.posture(values, at), trace, not self.settings.measures)
-        if self._is_free(q := chain.posture(blocked, at)):
-            return Met(q, trace, True)
         end = float(blocked[chain.held])
+        least = self._beside(end, blocked)
+        if least is not None and self._is_free(q := chain.posture(least, at)):
+            return Met(q, trace, True)
         while abs(end - values[chain.held]) > 1e-6:
             half = 0.5 * (end + float(values[chain.held]))
-            middle = chain.beside(goals, nearest, half, values)
+            middle = self._beside(half, values)
             if middle is not None and self._is_free(chain.posture(middle, at)):
                 values = middle
             else:  # blocked, or beyond limits
                 end = half
         return Met(chain.posture(values, at), trace, True)
+
+    def _beside(self, value: float, values: Array) -> Array | None:
+        """See `PlainChain.beside`."""
+        return self.chain.beside(self.asked.goals, self.asked.nearest, value, values, how_far(self.settings, 1))
 
     def _effort(self, q: Array) -> float:
         away = self.chain.angles(q) - self.asked.nearest[0]
@@ -287,8 +293,8 @@ class Rule(NamedTuple):
     """How the first batch of seeds is descended from."""
 
     guided: bool  # whether it is of the branches of a closed form
-    exact: bool  # which has the postures themselves, not only near ones
-    finite: bool  # whether ends are isolated too, and the closed form has all of them
+    held: bool  # with one joint held, so that ends lie along branches
+    finite: bool  # whether ends are isolated, and the closed form has all of them
     enough: int  # ends that meet the goals
     rows: int  # of the goals
     together: int  # seeds of a batch of random ones
@@ -298,11 +304,11 @@ class Rule(NamedTuple):
     def of(cls, chain: PlainChain, goals: Goals, settings: Settings, measured: bool) -> Rule:
         """The rule for problems with such goals."""
         guided, more = chain.is_guided(goals), 1 + settings.restarts_for_measure
-        exact = guided and chain.arm is not None
-        finite = exact and chain.held < 0
+        held = guided and chain.held >= 0
+        finite = guided and not held and chain.arm is not None
         enough = 1 if finite or not measured else SEEDS.compared * more
         rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)
-        return cls(guided, exact, finite, enough, rows, SEEDS.together * more, measured)
+        return cls(guided, held, finite, enough, rows, SEEDS.together * more, measured)
 
 
 def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:

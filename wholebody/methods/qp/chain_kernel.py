@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
-from wholebody.methods.qp.dense_kernel import copy, solve
+from wholebody.methods.qp.dense_kernel import copy, dot, gram, solve
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
@@ -120,6 +120,7 @@ def _descend(
     """
     size, rows = len(q), len(room.value)
     right, system, dq, ones = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.ones(size)
+    scaled = np.empty((rows, size))
     before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
@@ -144,7 +145,7 @@ def _descend(
                     if not room.free[i]:
                         right[r] -= room.jacobian[r, i] * dq[i]
                 damped += 0.5 * right[r] * right[r]
-            _fill_normal(room, ones, damped, system)
+            _fill_normal(room, ones, damped, scaled, system)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -176,7 +177,7 @@ def _least_effort(
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
     moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
-    released, (tolerance, most) = np.empty(size, dtype=np.bool_), asked
+    released, scaled, (tolerance, most) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
@@ -189,7 +190,7 @@ def _least_effort(
                 right[r] = room.value[r]
                 for i in range(size):
                     right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
-            _fill_normal(room, nearest[1], 1e-12, system)
+            _fill_normal(room, nearest[1], 1e-12, scaled, system)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -228,15 +229,13 @@ def _least_effort(
 
 
 @compiled(inner=True, error_model="numpy")
-def _fill_normal(room: Room, weights: Array, damping: float, system: Array) -> None:
-    """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,)."""
+def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array) -> None:
+    """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,); `scaled` is room."""
     for r in range(len(system)):
-        for s in range(r + 1):
-            total = 0.0
-            for i in range(len(weights)):
-                if room.free[i]:
-                    total += room.jacobian[r, i] * room.jacobian[s, i] / weights[i]
-            system[r, s] = total
+        for i in range(len(weights)):
+            scaled[r, i] = room.jacobian[r, i] / weights[i] if room.free[i] else 0.0
+    gram(scaled, room.jacobian, len(system), system)
+    for r in range(len(system)):
         system[r, r] += damping
 
 
@@ -349,10 +348,7 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
         for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
             for k in range(len(room.columns)):
                 moved = support[entries[e, 1], k] - support[entries[e, 2], k]
-                room.jacobian[r, k] = 0.0
-                if moved != 0:
-                    for i in range(6):
-                        room.jacobian[r, k] += moved * room.wrench[r, i] * room.columns[k, i]
+                room.jacobian[r, k] = moved * dot(room.wrench[r], room.columns[k]) if moved != 0 else 0.0
 
 
 @compiled(error_model="numpy", nogil=True)

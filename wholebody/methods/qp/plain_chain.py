@@ -115,26 +115,36 @@ class PlainChain:
                 found, effort = np.empty((samples, BRANCHES, len(self.idx_v))), np.empty((samples, BRANCHES))
                 order = np.empty(effort.size, dtype=np.intp)
                 count = closed_form_kernel().sampled(
-                    self.arm, goals.tables[0], (self.chain.lower, self.chain.upper), nearest, found, effort, order
+                    self.guide, goals.tables[0], (self.chain.lower, self.chain.upper), nearest, found, effort, order
                 )
         values = found.reshape(-1, len(self.idx_v))
         return Branches(values, effort.ravel(), values[order[:count]])
 
     def along(self, goals: Goals, nearest: Array, values: Array) -> Array | None:
-        """Values (n,) of the least effort between the samples beside others of a branch; None where there are none."""
-        assert self.arm is not None
+        """The guide's branch (n,) of least effort between the samples beside values (n,); None where there is none."""
         found, held = values.copy(), self.held
         turn = min(self.chain.upper[held] - self.chain.lower[held], 2.0 * np.pi)
         spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().along(self.arm, goals.tables[0], limits, nearest, spacing, found)
+        effort = closed_form_kernel().along(self.guide, goals.tables[0], limits, nearest, spacing, found)
         return found if effort < np.inf else None
 
-    def beside(self, goals: Goals, nearest: Array, value: float, values: Array) -> Array | None:
+    def beside(self, goals: Goals, nearest: Array, value: float, values: Array, asked: Array) -> Array | None:
         """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
-        assert self.arm is not None
         found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().beside(self.arm, goals.tables[0], limits, nearest, value, values, found)
-        return found if effort < np.inf else None
+        effort = closed_form_kernel().beside(self.guide, goals.tables[0], limits, nearest, value, values, found)
+        return self._met(goals, found, asked) if effort < np.inf else None
+
+    def _met(self, goals: Goals, values: Array, asked: Array) -> Array | None:
+        """Values (n,) of the guide, which a descent with the held joint at rest leads to the goals where it is near."""
+        if self.arm is not None:
+            return values
+        lower, upper = self.chain.lower.copy(), self.chain.upper.copy()
+        lower[self.held] = upper[self.held] = values[self.held]
+        chain, size = with_values(self.chain, lower=lower, upper=upper), len(values)
+        room, found = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries)), np.empty((1, 4))
+        at_rest = np.array([values, np.zeros(size)])
+        compiled_kernel().reach(chain, goals, room, values[None], at_rest, asked, np.zeros(1), found)
+        return values if found[0, 1] < np.inf else None
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof."""
