@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.audits.attack.judging import Case
-from tests.audits.attack.running import run
+from wholebody.bench.attack.judging import Case
+from wholebody.bench.attack.running import run
 
 
 @pytest.mark.parametrize("seed", [1])  # in none a mesh stays whole enough to be decomposed, for seconds

@@ -7,7 +7,6 @@ writes its tables and charts into a folder, as the commands of `wholebody bench`
 from __future__ import annotations
 
 import argparse
-import itertools
 import shutil
 import sys
 from collections.abc import Sequence
@@ -15,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.checks import number
-from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import report
+from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.bench.command import folders, listed, measuring, publish, seed
+from wholebody.cli.bench.command import listed, measuring, publish, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
 from wholebody.cli.command import command, count, flag, option
 
@@ -52,14 +51,17 @@ def newton(arguments: argparse.Namespace) -> None:
 @measuring(
     "qp",
     "the quadratic programs of all problem sets by every solver alone",
-    "Record the programs that the QP method poses on the problem sets, and give them to every QP solver alone.",
+    "Record the programs that the QP method poses on the problem sets, keep them as files that "
+    "qpsolvers reads and as a test set of qpbenchmark, and give them to every QP solver alone.",
     count("--count", 2000, "programs"),
     seed("of the problem sets"),
     listed("--solvers", "QP solvers (default: all that are installed)"),
     listed("--sets", "problem sets (default: all)"),
+    option("--programs", type=Path, metavar="DIR", help="files of an earlier run, instead of recording"),
 )
 def qp(arguments: argparse.Namespace) -> None:
     """Measure solvers of quadratic programs."""
+    from tests.audits.qp_programs import files
     from tests.audits.qp_programs.measuring import measure, qp_report, summaries
     from tests.audits.qp_programs.recording import record
     from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
@@ -69,7 +71,11 @@ def qp(arguments: argparse.Namespace) -> None:
     solvers = tuple(arguments.solvers or solver_names())
     for name in solvers:
         make_solver(name)
-    programs = record(sets, QUICK if arguments.quick else arguments.count, arguments.seed, print)
+    if arguments.programs is None:
+        programs = record(sets, QUICK if arguments.quick else arguments.count, arguments.seed, print)
+        files.save(programs, arguments.out / "qp-programs")
+    else:
+        programs = [one for one in files.load(arguments.programs) if one.set in sets]
     facts = machine() | {"seed": str(arguments.seed)}
     rows = measure(programs, solvers, print)
     totals = summaries(rows, solvers)
@@ -174,6 +180,31 @@ def loads(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
+    "detail",
+    "levels of modelling",
+    "Solve problems with the person as spheres, capsules and hulls, with all pairs and with those "
+    "that can touch, and judge the answers in the finest model.",
+    count("--count", 8, "cases of each level"),
+    seed("of the first case"),
+)
+def detail(arguments: argparse.Namespace) -> None:
+    """The same tasks with every detail of geometry, judged in the finest model."""
+    from tests.audits import detail
+
+    facts, refused = machine(), dict[str, None]()
+    rows = list(detail.detail_rows(2 if arguments.quick else arguments.count, arguments.seed, refused.setdefault))
+    about = (
+        "Answers of `qp` that their own model calls solved, judged in the finest model with everything in it: how "
+        "many are inside something by more than 0.1 mm, and by how much the worst misses what it is asked; the effort "
+        "is held against the finest model's own answer. Medians over the cases, of the processor's time. Simplified "
+        "is `wb.simplify`."
+    )
+    shown = [row for row in detail.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
+    text = report(about, {"": only(shown, *detail.SHOWN)}, facts, list(refused))
+    publish("detail", text, arguments, facts=facts, tables={"detail": rows}, page=None)
+
+
+@measuring(
     "ablation",
     "what each constant and mechanism of a method is worth, in counts",
     "Change one constant or switch one mechanism off at a time, and count answers that differ.",
@@ -261,56 +292,7 @@ def postures(arguments: argparse.Namespace) -> None:
     publish("postures", text, arguments, facts=facts, tables={"postures": rows}, page=None)
 
 
-@command(
-    "attack",
-    "random hard cases of every kind, judged",
-    """\
-Attack the package with random hard cases: solves that begin inside things, with goals that contradict or are out of
-reach; streams; sweeps; contacts beside points at the place found; mutated files. Answers are judged by coal over all
-pairs and by Pinocchio alone. Every failure is written as a script that repeats it. Case K of a seed is
-always the same. The exit code is 1 where something was wrong: a false claim, an error other than one sentence, a crash,
-or no end within a minute. What ended before Ctrl-C is written.""",
-    option("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)"),
-    seed("of all cases"),
-    count("--first", 0, "number of the first case", least=0),
-    count("--cases", None, "end after as many cases, if the time suffices"),
-    listed("--kinds", "of cases, such as solve, stream, file (default: all)", "KIND"),
-    count("--jobs", 1, "processes at a time"),
-    *folders("out/attack"),
-)
-def attack(arguments: argparse.Namespace) -> int:
-    """Attack; 1 where something was wrong."""
-    from tests.audits.attack import running
-    from tests.audits.attack.judging import KINDS, Case, kind_of
-    from wholebody.bench.rows import Row
-
-    seconds = number(arguments.seconds, "--seconds", 1e-3, 1e9, "s")
-    kinds = chosen(arguments.kinds, KINDS, "--kinds")
-    cases = (Case(arguments.seed, k, kind) for k in itertools.count(arguments.first) if (kind := kind_of(k)) in kinds)
-    asked = itertools.islice(cases, arguments.cases)
-    rows: list[Row] = []
-    interrupted = False
-    try:
-        for case, verdict in running.attack(asked, arguments.jobs, running.for_seconds(seconds)):
-            rows.append(running.row(case, verdict))
-            if rows[-1]["outcome"] == "wrong":
-                print(f"WRONG: {case.kind} {case.number}: {rows[-1]['words']}", flush=True)
-            elif len(rows) % 200 == 0:
-                print(f"{len(rows)} cases, {sum(one['outcome'] == 'wrong' for one in rows)} wrong", flush=True)
-            if rows[-1]["outcome"] == "wrong" or running.is_slow(rows[-1]):
-                running.keep(case, verdict, arguments.out)
-    except KeyboardInterrupt:
-        interrupted = True
-    if not rows:
-        raise InputError("no case ended; give more --seconds")
-    rows.sort(key=lambda one: one["number"])
-    facts = machine()
-    text, page = running.report(rows, facts), "where-methods-fail.md"
-    publish("attack", text, arguments, facts=facts, tables={"attack": rows}, page=page)
-    return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C
-
-
-COMMANDS = (newton, qp, human, postures, regress, loads, ablation, robots, plans, attack)
+COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -1,16 +1,23 @@
-"""Recorded programs: a seed has the same ones, figures are those of the answers."""
+"""Recorded programs: a seed has the same ones, files say the same to qpsolvers, figures are those of the answers."""
 
 from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
+from tests.audits.qp_programs import files
 from tests.audits.qp_programs.measuring import measure, residuals, summaries
 from tests.audits.qp_programs.recording import Recorded, record
+from tests.reference.active_set import objective
 from wholebody.base.arrays import with_values
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.registry import solver_names
+from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
 
 @pytest.fixture(scope="module")
@@ -23,10 +30,10 @@ def same(one: QuadraticProgram, other: QuadraticProgram) -> bool:
 
 
 def test_a_seed_has_the_same_programs(recorded: list[Recorded]) -> None:
+    again = record(["robot_arm", "drag"], 6, seed=3)
+    assert [one.name for one in again] == [one.name for one in recorded]
+    assert all(same(one.program, other.program) for one, other in zip(again, recorded, strict=True))
     assert [one.set for one in recorded] == ["robot_arm"] * 3 + ["drag"] * 3
-    again = record(["robot_arm"], 3, seed=3)
-    assert [one.name for one in again] == [one.name for one in recorded[:3]]
-    assert all(same(one.program, other.program) for one, other in zip(again, recorded, strict=False))
     others = record(["robot_arm"], 3, seed=4)
     assert not any(same(one.program, other.program) for one in others for other in recorded)
 
@@ -37,6 +44,59 @@ def test_more_programs_than_there_are_and_unknown_sets_are_refused(monkeypatch: 
         record(["robot_arm"], 100, seed=0)
     with pytest.raises(UnknownNameError, match="robot_arm"):
         record(["robot_arms"], 1, seed=0)
+
+
+def test_the_test_set_of_qpbenchmark_has_every_program(
+    recorded: list[Recorded], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where qpbenchmark is not installed, by a stand-in with the two classes that the file uses."""
+    qpsolvers = pytest.importorskip("qpsolvers")
+    try:
+        import qpbenchmark  # noqa: F401
+    except ImportError:
+        known = ModuleType("qpbenchmark")
+        monkeypatch.setitem(vars(known), "TestSet", object)
+        monkeypatch.setitem(vars(known), "Problem", qpsolvers.Problem)
+        monkeypatch.setitem(sys.modules, "qpbenchmark", known)
+    files.save(recorded, tmp_path)
+    found = runpy.run_path(str(tmp_path / "wholebody_postures.py"))["WholebodyPostures"]()
+    sizes = [len(problem.q) for problem in found]
+    assert len(sizes) == len(recorded)
+    programs = [one.program for one in sorted(recorded, key=lambda one: one.name)]
+    assert sizes == [one.size + len(one.target) + len(one.least) for one in programs]
+    assert found.title == "Whole-body postures"
+
+
+def test_files_come_back_and_are_programs_of_qpsolvers(recorded: list[Recorded], tmp_path: Path) -> None:
+    qpsolvers = pytest.importorskip("qpsolvers")
+    files.save(recorded, tmp_path)
+    back = {one.name: one for one in files.load(tmp_path)}
+    assert set(back) == {one.name for one in recorded}
+    for one in recorded:
+        assert same(back[one.name].program, one.program)
+        problem = qpsolvers.Problem.load(str(tmp_path / f"{one.name}.npz"))
+        x = make_solver("daqp", hot_start=False).solve(one.program).x
+        r = one.program.rows @ x - one.program.target
+        s = np.maximum(one.program.least - one.program.elastic @ x, 0.0)
+        z = np.concatenate([x, r, s])
+        assert problem.A @ z == pytest.approx(problem.b, abs=1e-12)
+        assert (problem.G @ z <= problem.h + 1e-12).all()
+        assert (z >= problem.lb).all()
+        assert (z <= problem.ub).all()
+        least = objective(one.program, x)
+        constant = 0.5 * z @ problem.P @ z + problem.q @ z
+        assert constant == pytest.approx(least, rel=1e-9, abs=1e-9)
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match="has no programs"):
+        files.load(tmp_path)
+    np.savez(tmp_path / "robot_arm-000-000.npz", P=np.eye(2))
+    with pytest.raises(FileFormatError, match="is no program"):
+        files.load(tmp_path)
+    (tmp_path / "robot_arm-000-000.npz").rename(tmp_path / "other.npz")
+    with pytest.raises(FileFormatError, match="other"):
+        files.load(tmp_path)
 
 
 def test_residuals_of_a_program_that_is_solved_by_hand() -> None:

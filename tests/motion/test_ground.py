@@ -106,6 +106,13 @@ def slides(clip: wb.Clip, stands: dict[str, np.ndarray]) -> np.ndarray:
     return np.concatenate(found)
 
 
+def test_feet_that_pass_each_other_between_two_frames_do_not_overlap(human: wb.Figure, shared_data: Path) -> None:
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_03.bvh")  # a run, at 30 Hz
+    found = wb.check(wb.retarget(motion, human), wb.Scene(human).add(wb.HalfSpace(), name="floor"))
+    assert found.colliding == 0
+    assert found.deepest_between < 2e-3
+
+
 @pytest.mark.parametrize("height", [flat, stairs, rocks])
 def test_feet_rest_where_they_do(height: Terrain) -> None:
     motion, stands = walker(height)

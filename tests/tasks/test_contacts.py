@@ -19,7 +19,11 @@ SEAT = 0.40  # m: top of the seat
 
 @pytest.fixture(scope="module")
 def scene() -> wb.Scene:
-    made = wb.Scene(wb.load("human", sex="male", stature=1.75))
+    return _furnished(wb.load("human", sex="male", stature=1.75))
+
+
+def _furnished(figure: wb.Figure) -> wb.Scene:
+    made = wb.Scene(figure)
     made.add(wb.HalfSpace(), name="floor")
     made.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, SEAT - 0.02))
     made.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.57, 0.0, 0.82))
@@ -43,6 +47,39 @@ TERMS = {
     "palm_side": wb.Grasp("right_hand", "box", side=(0, 0, 1)),
     "power": wb.Grasp("right", "bar", "power"),
 }
+OFTEN = {
+    **TERMS,
+    "on_a_tray": wb.Stand("tray", balance=False),
+    "sit_on_a_tray": wb.Sit("tray"),
+    "still": wb.Posture("sitting"),
+    "comfort": wb.tasks.Discomfort(),
+    "low": wb.tasks.PotentialEnergy(),
+}
+
+
+@pytest.mark.parametrize("name", OFTEN)
+def test_a_term_is_the_same_whatever_was_stated_before(name: str) -> None:
+    # what does not follow from the start is kept with the scene; a tray in the hand turns with the start
+    figure, rng = wb.load("human", sex="male", stature=1.75), np.random.default_rng(5)
+    tray = wb.Box((0.3, 0.2, 0.02))
+    used, anew = (_furnished(figure).attach(tray, to="right_palm", name="tray", at=(0.1, 0.0, 0.05)) for _ in range(2))
+    start = pin.integrate(figure.model, figure.posture("standing"), 0.2 * rng.normal(size=55))
+    OFTEN[name].resolve(used, figure.posture("sitting"))
+    for scene in (used, anew):
+        for thing, place in (
+            ("floor", (0.0, 0.0, 0.05)),
+            ("seat", (-0.3, 0.1, 0.5)),
+            ("tray", (0.1, 0.0, 0.05, 0.6, 0.0, 0.0, 0.8)),
+        ):
+            scene.move(thing, at=place)
+    OFTEN[name].resolve(used, figure.posture("arms_forward"))
+    terms: list[Any] = [OFTEN[name].resolve(scene, start) for scene in (used, anew)]
+    for q in (start, figure.posture("sitting")):
+        here = State(figure.model).update(q)
+        values = [term.value(here) if hasattr(term, "value") else term.error(here) for term in terms]
+        np.testing.assert_array_equal(*values)
+
+
 HALF = 2e-6  # m, rad: half of a difference; coal's distances are good to 1e-9
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from tests.audits.attack.terms import at_the_place, contact
+from wholebody.bench.attack.terms import at_the_place, contact
 
 CASES = {
     "left tip on a rod": 1989,

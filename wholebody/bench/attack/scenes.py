@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from tests.audits.attack.judging import CORPUS, Pairs, chosen
 from wholebody.base.arrays import Array
+from wholebody.bench.attack.judging import CORPUS, Pairs, chosen
 from wholebody.bench.suite.problem_sets.things import Occupied, turned
 from wholebody.bench.tables import render
 from wholebody.figures.packaged_urdf import task_paths, urdf_path

@@ -31,6 +31,9 @@ PATTERN = (
     + ("file", "sweep", "file", "solve") * 3
     + ("file", "solve", "file", "stream") * 2
     + ("file", "solve", "file", "contact")
+    + ("file", "own-term", "file", "pairs")
+    + ("file", "sleeper", "file", "weights")
+    + ("file", "put")
 )
 """Kinds of cases in turn: two mutated files for each solve."""
 KINDS = {
@@ -39,6 +42,11 @@ KINDS = {
     "sweep": "sweeps against a fine subdivision",
     "stream": "streams of moving goals and things, every step and the motion between two",
     "contact": "contacts, against the effort of a point or frame at the place found",
+    "own-term": "solves and steps with terms of one's own that are not finite, or answer something odd",
+    "pairs": "things in each other, against every two pieces",
+    "sleeper": "sleeping bodies whose support slides, turns, jumps or leaves",
+    "weights": "goals of one frame with weights from 1 to 1e6, met in at most thrice the frames of equal ones",
+    "put": "things that are put into a figure that is shown, every frame free or reported",
 }
 
 

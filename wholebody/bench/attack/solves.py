@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from tests.audits.attack.judging import Judged, Pairs, Verdict, chosen, judge
-from tests.audits.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.base.arrays import Array
+from wholebody.bench.attack.judging import Judged, Pairs, Verdict, chosen, judge
+from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods import installed_methods
 from wholebody.methods.solve import method_named

@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.audits.attack.judging import Pairs, Verdict, judge
-from tests.audits.attack.solves import verdict
+from wholebody.bench.attack.judging import Pairs, Verdict, judge
+from wholebody.bench.attack.solves import verdict
 from wholebody.bench.suite.stability.bodies import Builder, planar_arm, sliding_tool
 
 REACHED = (0.6, 0.0, 0.0)

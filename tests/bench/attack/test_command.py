@@ -1,4 +1,4 @@
-"""`python -m tests.audits attack` from end to end, on a kind that takes no time."""
+"""`wholebody bench attack` from end to end, on a kind that takes no time."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.audits.__main__ import attack
-from tests.audits.attack.judging import Case, Verdict
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.attack.judging import Case, Verdict
+from wholebody.cli.bench import run as group
 
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    attack.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["attack", *words])
+    group.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["bench", "attack", *words])
     return int(arguments.run(arguments))
 
 
@@ -46,7 +46,7 @@ def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.
             yield case, Verdict("right", "nothing")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("tests.audits.attack.running.attack", two)
+    monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
     assert bench("--out", str(tmp_path)) == 130
     rows = csv_rows(tmp_path / "attack.csv")
     assert [row["number"] for row in rows] == ["0", "1"]

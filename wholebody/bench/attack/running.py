@@ -16,15 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.audits.attack import frames, inputs, solves, terms
-from tests.audits.attack.judging import KINDS, Case, Verdict
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, Job, allow_processor, run_jobs
+from wholebody.bench.attack import frames, inputs, solves, terms
+from wholebody.bench.attack.judging import KINDS, Case, Verdict
 from wholebody.bench.rows import Row, times
 from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
-from wholebody.bench.tables import write_text
+from wholebody.bench.tables import render, write_text
 
 CASES = {
     "file": inputs.file,
@@ -32,16 +32,12 @@ CASES = {
     "stream": frames.stream,
     "sweep": frames.sweep,
     "contact": terms.contact,
+    "own-term": terms.own_term,
+    "pairs": frames.pairs,
+    "sleeper": frames.sleeper,
+    "weights": frames.weights,
+    "put": frames.put,
 }
-
-
-REPEAT = """from pathlib import Path
-
-from tests.audits.attack.judging import Case
-from tests.audits.attack.running import run
-
-print(run(Case({}, {}, {!r}), Path(__file__).parent))  # which writes the files that it reads beside this script
-"""
 
 
 def attack(
@@ -190,7 +186,7 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
 
 
 def keep(case: Case, verdict: Verdict, folder: Path) -> None:
-    """Write a failure: the script that repeats it from the root of the checkout, and what was found."""
+    """Write a failure: the script that repeats it, and what was found."""
     place = folder / case.name
-    write_text(place / "repeat.py", REPEAT.format(*case))
+    write_text(place / "repeat.py", render("repeat.py", case=case) + "\n")
     write_text(place / "found.txt", verdict.words + "\n")

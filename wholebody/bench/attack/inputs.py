@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from tests.audits.attack.judging import CORPUS, Verdict, chosen
+from wholebody.bench.attack.judging import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.taskfile import read_result, read_task
 
