@@ -45,7 +45,7 @@ class PostureRow:
         half: "fit" if weights are fitted to it, "kept" if they are judged by it.
         posture, angle: what is measured.
         mean, sd: of people, degrees.
-        spread: "sd", or "range" where the source has a range alone.
+        spread: "sd", "range" where the source has a range alone, or "class" where it has the class of most people.
         source: the publication.
         ours: the median man's, degrees.
         status: of the solution.

@@ -141,9 +141,11 @@ def judge(path: Path, sex: str) -> dict[str, float]:
     """Compare the distribution with the people kept back.
 
     Returns:
-        Largest difference of a share below a kept-back percentile (5 to 95); the largest root mean square error, over
-        that of a linear regression on the same dimensions, of the dimensions given stature and mass, and given these
-        and six more; share of these people whose dimensions are refused.
+        Largest difference of a share below a kept-back percentile (5 to 95); the root mean square error of shares that
+        are at most a quartile in two dimensions, that of the table's other rows, and the standard error that kept-back
+        shares have themselves; the largest root mean square error, over that of a linear regression on the same
+        dimensions, of the dimensions given stature and mass, and given these and six more; share of these people whose
+        dimensions are refused.
     """
     own, other = people(path, False)[sex], people(path, True)[sex]
     whole = Population(sex)
@@ -153,7 +155,7 @@ def judge(path: Path, sex: str) -> dict[str, float]:
         x = exact + blur * SCALE.get(name, 1e-3)  # all were rounded
         for part in (0.05, 0.25, 0.5, 0.75, 0.95):
             share = max(share, abs(float((x <= whole.quantile(name, part)).mean()) - part))
-    found = {"share": share}
+    found = {"share": share, **_pairs(own, other, whole)}
     size = ("stature", "mass")
     six = ("sitting_height", "bideltoid_breadth", "span", "hip_breadth_sitting", "popliteal_height", "foot_length")
     for given in (size, (*size, *six)):
@@ -175,6 +177,27 @@ def judge(path: Path, sex: str) -> dict[str, float]:
         refused += whole.unlikely(values, {name: float(other[name][k]) for name in size}) is not None
     found["refused"] = refused / len(other["age"])
     return found
+
+
+def _pairs(own: Mapping[str, Array], other: Mapping[str, Array], whole: Population) -> dict[str, float]:
+    """Errors of shares in two dimensions, of the distribution and of the table's other rows."""
+    sample = whole.sample(8192, np.random.default_rng(0))
+    drawn = {name: np.array([one[name] for one in sample]) for name in other}
+    ends = {  # half a unit above, as the table is rounded
+        name: np.quantile(column, (0.25, 0.5, 0.75)) + 0.5 * SCALE.get(name, 1e-3)
+        for name, column in other.items()
+        if name != "age"
+    }
+
+    def shares(of: Mapping[str, Array]) -> Array:
+        below = np.stack([of[name][:, None] <= ends[name] for name in ends]).astype(float)
+        both = np.einsum("ipa,jpb->ijab", below, below) / below.shape[1]
+        return np.asarray(both[np.triu_indices(len(ends), 1)])
+
+    kept = shares(other)
+    errors = {"pairs": shares(drawn) - kept, "pairs of rows": shares(own) - kept}
+    noise = float(np.sqrt(np.mean(kept * (1.0 - kept)) / len(other["age"])))
+    return {name: float(np.sqrt(np.mean(one**2))) for name, one in errors.items()} | {"pairs' standard error": noise}
 
 
 def main(path: Path) -> None:

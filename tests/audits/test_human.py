@@ -43,7 +43,7 @@ def test_published_postures_are_numbers_with_sources() -> None:
         assert float(row["sd"]) > 0.0, row
         assert 0.0 < float(row["mean"]) < 180.0, row
         assert row["source"], row
-        assert row["spread"] in ("sd", "range"), row
+        assert row["spread"] in ("sd", "range", "class"), row
 
 
 def test_typing_wrists_turn_as_those_of_90_typists_do() -> None:

@@ -13,6 +13,8 @@ import wholebody as wb
 from wholebody.base.errors import FileFormatError
 from wholebody.cli import main
 from wholebody.figures import urdf_path
+from wholebody.figures.anthropometry import make_person
+from wholebody.figures.packaged_urdf import write_human
 from wholebody.figures.state import State
 
 
@@ -40,6 +42,7 @@ def test_what_is_read_back_is_what_was_written(name: str) -> None:
     for cone in built.cones:
         assert read.cones[cone].cone.vertices == pytest.approx(built.cones[cone].cone.vertices, abs=1e-10)
         assert read.cones[cone][1:3] == built.cones[cone][1:3]
+    assert repr(read.describe().person) == repr(built.describe().person)
     assert sorted(read.ranges) == sorted(built.ranges)
     scenes = wb.Scene(read), wb.Scene(built)
     for part in built.ranges:  # the same values and slopes where every joint has moved
@@ -62,6 +65,41 @@ def test_a_person_of_any_size_can_be_written_and_read_with_a_fixed_root(tmp_path
     assert sum(inertia.mass for inertia in figure.model.inertias) == pytest.approx(
         sum(inertia.mass for inertia in wb.load("human", sex="female", stature=1.55).model.inertias)
     )
+
+
+def test_whose_body_it_is_comes_back(tmp_path: Path) -> None:
+    """Strength follows sex and age: 52 years leave a person less of it."""
+    own = {"sitting_height": 0.86, "hip_breadth_sitting": 0.41}
+    person = make_person("female", 1.62, 71.5, age=52.0, proportions=own, shoes=0.02, clothing=0.004)
+    write_human(path := tmp_path / "woman.urdf", person)
+    figure = wb.load(path)
+    read = figure.describe().person
+    assert read is not None
+    assert (read.sex, read.age, read.shoes, read.clothing) == ("female", 52.0, 0.02, 0.004)
+    assert (read.stature, read.mass, read.stated) == (1.62, 71.5, tuple(sorted(own)))
+    assert dict(read.dimensions) == pytest.approx(dict(person.dimensions))
+    young = wb.load("human", sex="female", stature=1.62, mass=71.5, proportions=own)
+    old, strong = (np.nan_to_num(wb.motion.Strength().limits(one)[1], posinf=0.0) for one in (figure, young))
+    assert 0.0 < np.abs(old).sum() < np.abs(strong).sum()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('sex="male"', 'sex="robot"', "give 'male' or 'female'"),
+        ('stature="1.755"', 'stature="175.5"', "stature"),
+        ('mass="84.6"', 'mass="much"', "give a finite number"),
+        ('mass="84.6"', 'mass="84.6" dimensions="nose" values="0.05"', "nose"),
+    ],
+)
+def test_a_person_whom_nobody_can_be_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+    text = urdf_path("human").read_text()
+    assert text.count(old) == 1
+    path = tmp_path / "human.urdf"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(FileFormatError, match=said) as caught:
+        wb.load(path)
+    assert "<person>" in str(caught.value)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("mujoco") is None, reason="mujoco is not installed")

@@ -21,11 +21,13 @@ parts are by name::
        bound="1.7" slope="0 0 1.38"/>
       <collision_group name="left_arm" segments="left_forearm left_hand"/>
       <effort joints="left_clavicle_elevation" weights="1000"/>
+      <person sex="male" stature="1.755" mass="84.6" age="40" dimensions="sitting_height" values="0.93"/>
     </wholebody>
 
 A posture gives the joints that are not at zero, in radians and metres, and the placement of the root: x, y, z and the
-quaternion x, y, z, w. Pieces have the names of their ``<collision>`` elements. All pairs are tested except the untested
-ones and those whose pieces are on one joint.
+quaternion x, y, z, w. The person is whose body it is: sizes in metres and kilograms, the age in years if it is known,
+and the dimensions that were stated. Pieces have the names of their ``<collision>`` elements. All pairs are tested
+except the untested ones and those whose pieces are on one joint.
 """
 
 from __future__ import annotations
@@ -44,6 +46,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError, WholebodyError
+from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import digits
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
@@ -58,6 +61,9 @@ from wholebody.figures.motion_ranges import (
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
+
+SIZES = ("stature", "mass", "age", "shoes", "clothing")
+"""Numbers of a person that a file has, those that are known."""
 
 
 def extension_text(figure: Figure) -> str:
@@ -98,6 +104,8 @@ def extension_text(figure: Figure) -> str:
         SubElement(made, "effort", joints=" ".join(effort), weights=digits(effort.values()))
     if any(known.root_effort):
         SubElement(made, "root_effort", weights=digits(known.root_effort))
+    if known.person is not None:
+        _add_person(made, known.person)
     ElementTree.indent(made, space="  ", level=1)
     return "  " + ElementTree.tostring(made, encoding="unicode").rstrip() + "\n"
 
@@ -149,6 +157,7 @@ class _Reader:
             },
             root_effort=self._root_effort(),
             notes=notes,
+            person=self._person(),
         )
         return Figure(name, self.model, self.geometry, self.element.get("detail", "own"), description)
 
@@ -229,6 +238,19 @@ class _Reader:
             self._fail("<root_effort> has a negative weight; weights are zero or more")
         return position, rotation
 
+    def _person(self) -> Person | None:
+        item = self.element.find("person")
+        if item is None:
+            return None
+        place = self._place(item)
+        sizes = {name: numbers(item, name, place, 1)[0] for name in SIZES if item.get(name) is not None}
+        names = item.get("dimensions", "").split()
+        values = numbers(item, "values", place, len(names)) if names else ()
+        try:
+            return make_person(item.get("sex", ""), **sizes, proportions=dict(zip(names, values, strict=True)))
+        except WholebodyError as error:
+            raise FileFormatError(f"{place}: {error}") from None
+
     def _listed(self, tag: str) -> tuple[str, ...]:
         return tuple(
             name for item in self.element.findall(tag) for name in self._names(item, "names", "frame", self.frames)
@@ -264,6 +286,15 @@ def _placed(figure: Articulated, root: Array | None, values: dict[str, float]) -
     if root is not None and figure.root == "free":
         q[:7] = root
     return np.asarray(figure.with_joints(q, values))
+
+
+def _add_person(made: Element, person: Person) -> None:
+    sizes = {name: digits([value]) for name in SIZES if (value := getattr(person, name)) is not None}
+    found = SubElement(made, "person", {"sex": person.sex, **sizes})
+    if person.stated:
+        of = dict(person.dimensions)
+        found.set("dimensions", " ".join(person.stated))
+        found.set("values", digits(of[name] for name in person.stated))
 
 
 def _add_ranges(made: Element, ranges: Mapping[str, MotionRange]) -> None:
