@@ -292,11 +292,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "RigidBodies.advance(kinematic)", Call(engine.advance, {"dt": 0.1, "kinematic": still})
     for name in ("placement", "twist", "response", "centre", "weight"):
         yield f"RigidBodies.{name}", Call(getattr(engine, name), {"name": "ball"})
-    for name in ("energy", "momentum"):
+    for name in ("energy", "momentum", "way_back"):
         yield f"RigidBodies.{name}", Call(getattr(engine, name), {})
     point = {"name": "ball", "point": (1.0, 1.0, 1.0)}
     for name in ("velocity_at", "mobility"):
         yield f"RigidBodies.{name}", Call(getattr(engine, name), point)
+    yield "RigidBodies.contacts", Call(engine.contacts, {"names": ["ball"]})
     yield "RigidBodies.put", Call(engine.put, {"name": "ball", "at": pin.SE3.Identity()})
     yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
     spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}

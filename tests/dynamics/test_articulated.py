@@ -280,3 +280,77 @@ def test_what_drives_a_joint_is_given_by_its_name() -> None:
         wb.Actuated(figure, damping=-1.0)
     with pytest.raises(wb.InputError, match="scene is not one of"):
         wb.World(wb.Scene(wb.load("hand")), spring=wb.Actuated(figure))
+
+
+def balls_at_hand(balls: Any, material: wb.dynamics.Material) -> tuple[Articulated, RigidBodies, dict[str, int]]:
+    """A limp hand without weight, and balls of 0.03 m that fly at it: offsets from the palm, masses, velocities."""
+    hand = wb.load("hand")
+    start, scene = hand.posture("relaxed"), wb.Scene(hand)
+    palm = hand.placement(start, "right_palm").translation
+    for k, (off, mass, velocity) in enumerate(balls):
+        body = wb.Body(mass=mass, velocity=velocity, material=material)
+        scene.add(wb.Sphere(0.03), name=f"ball{k}", at=palm + off, body=body)
+    engine = RigidBodies(scene, NO_WEIGHT, start)
+    moving = Articulated(scene, start, wb.Actuated(hand, stiffness=0.0, damping=0.0), engine)
+    return moving, engine, {name: scene.frame_id(name) for name in hand.segments}
+
+
+@pytest.mark.parametrize("bounce", [0.0, 1.0])
+@pytest.mark.parametrize("masses", [(0.3, 1.0, 0.02), (0.3, 0.3, 0.3), (0.3, 10.0, 0.3)])
+def test_balls_that_meet_at_a_hand_keep_the_momentum_of_all(masses: tuple[float, ...], bounce: float) -> None:
+    ways = ((0.0, 0.02, 0.2), (0.05, 0.0, -0.2), (-0.02, 0.05, 0.3)), ((0, 0, -2.0), (0, 0, 2.5), (0, 0, -4.0))
+    material = wb.dynamics.Material("many", {"human": (bounce, 0.3), "many": (bounce, 0.3)})
+    balls = [(np.array(off), mass, speed) for off, mass, speed in zip(ways[0], masses, ways[1], strict=True)]
+    moving, engine, segments = balls_at_hand(balls, material)
+    began, energy, hits = engine.momentum(), engine.energy(), set[str]()
+    for _ in range(12):
+        moving.advance(moving.q, DT, {}, segments)
+        hits |= moving.impulses.keys()
+        together = engine.momentum() + moving.momentum()
+        assert together[:3] == pytest.approx(began[:3], abs=1e-9 * sum(masses))
+        assert moving.energy() + engine.energy() < energy * (1.0 + 1e-9)
+        energy = moving.energy() + engine.energy()
+    assert len(hits) > 1
+
+
+ROD = """<robot name="rod"><link name="rod"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.2" izz="0.2" ixy="0"
+ixz="0" iyz="0"/></inertial><collision><geometry><box size="1.2 0.1 0.02"/></geometry></collision></link></robot>"""
+
+
+@pytest.mark.parametrize("bounce", [0.0, 0.6, 1.0])
+def test_three_balls_hit_a_rod_in_the_air_at_one_instant(tmp_path: Path, bounce: float) -> None:
+    (tmp_path / "rod.urdf").write_text(ROD)
+    rod = wb.load(tmp_path / "rod.urdf", root="free")
+    scene, places, masses = wb.Scene(rod), np.array([-0.5, 0.1, 0.45]), np.array([0.2, 0.5, 0.3])
+    material = wb.dynamics.Material("smooth", {"human": (bounce, 0.0), "smooth": (bounce, 0.0)})
+    for k, (x, mass) in enumerate(zip(places, masses, strict=True)):
+        body = wb.Body(mass=mass, velocity=(0.0, 0.0, -2.0), material=material)
+        scene.add(wb.Sphere(0.05), name=f"ball{k}", at=(x, 0.0, 0.07), body=body)
+    engine = RigidBodies(scene, NO_WEIGHT, rod.neutral)
+    moving = Articulated(scene, rod.neutral, wb.Actuated(rod, stiffness=0.0, damping=0.0), engine)
+    for _ in range(8):
+        moving.advance(moving.q, 1.0 / 240.0, {}, {"rod": scene.frame_id("rod")})
+    # u+ = -e u at all three: (1 / m_ball + 1 / m_rod + x_i x_j / I) p = (1 + e) 2 m/s, equation 9 for all at once
+    mobility = np.diag(1.0 / masses) + 1.0 / 2.0 + np.outer(places, places) / 0.2
+    impulse = np.linalg.solve(mobility, np.full(3, (1.0 + bounce) * 2.0))
+    assert (impulse > 0.0).all()
+    ended = [engine.twist(f"ball{k}")[2] for k in range(3)]
+    assert ended == pytest.approx(-2.0 + impulse / masses, abs=0.02)
+    assert moving.velocity[2] == pytest.approx(-impulse.sum() / 2.0, abs=0.02)
+    assert moving.velocity[4] == pytest.approx(places @ impulse / 0.2, abs=0.02)
+
+
+def test_a_ball_between_a_hand_and_a_table_is_held_there() -> None:
+    hand = wb.load("hand")
+    start = hand.posture("relaxed")
+    x, y, z = hand.placement(start, "right_palm").translation
+    scene = wb.Scene(hand).add(wb.HalfSpace(), name="table", at=(0, 0, z - 0.2))
+    scene.add(wb.Sphere(0.03), name="ball", at=(x, y, z - 0.1699), body=wb.Body(mass=0.5, material="wood"))
+    world = wb.World(scene, start, spring=wb.Actuated(hand))
+    tracked = start.copy()
+    for _ in range(30):
+        tracked[2] = max(tracked[2] - 0.01, start[2] - 0.22)  # into the ball by 0.07 m
+        frame = world.step(tracked)
+        assert frame.deepest < 1e-4
+    assert frame.placements["ball"].translation == pytest.approx((x, y, z - 0.17), abs=0.01)
+    assert frame.q[2] - start[2] > -0.18

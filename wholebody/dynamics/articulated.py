@@ -15,17 +15,15 @@ the velocities beside that are scaled so that energy is conserved where nothing 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
+from wholebody.dynamics.figure_points import Moved, Points, axes_of
 from wholebody.dynamics.frame import EngineFrame
-from wholebody.dynamics.pieces import surface_of
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.figures.state import free_roots
@@ -33,25 +31,9 @@ from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
-SHORTEST = 5e-4  # s: steps do not end earlier at an impact
+SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 PARTED = 0.2  # share of an overlap that a step removes
 FASTEST = 0.5  # m/s, at most
-
-Moved = Mapping[str, tuple[pin.SE3, pin.SE3]]
-
-
-class Points(NamedTuple):
-    """Points at which a figure is touched, and its joint limits, as m points of which only the normal counts."""
-
-    figure: Array  # (3 m, nv) velocities of the second body relative to the first along n, t1, t2, by those of joints
-    things: Array  # (3 m, 6 b) the same by the twists of the bodies that move by themselves
-    given: Array  # (3 m,) the same by what is moved, m/s
-    gap: Array  # (m,) metres, radians
-    friction: Array  # (m,)
-    restitution: Array  # (m,)
-    pushes: list[tuple[str, int, Array, Array]]  # name of such a body, its point's number, place (3,), axes (3, 3)
-    bodies: list[str]  # (b,)
-    driven: NDArray[np.bool_]  # (m,) points of what moves
 
 
 class Articulated:
@@ -124,11 +106,33 @@ class Articulated:
     # ---- a step
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
-        """Advance by at most a time, to the next impact if that comes first; by how much."""
+        """Advance by at most a time, to the next impact if that comes first; by how much.
+
+        The engine sees the figure as something that is moved. Where it finds an impact with it that the program of
+        the figure's contacts did not foresee, as that turns on the way, the step is made again, and ends there.
+        """
+        figure, impulses = (self.q, self.velocity), self.impulses.copy()
+        back = None if self._engine is None else self._engine.way_back()
+        most = time
+        while True:
+            done, frame = self._attempt(most, time, aim, steady, moved, segments)
+            hits = () if frame is None else (e for e in frame.events if e.speed > BOUNCE)
+            met = [e.time for e in hits if not segments.keys().isdisjoint((e.first, e.second))]
+            if not met or done <= SHORTEST or back is None:
+                self.frames += [] if frame is None else [frame]
+                return done
+            most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
+            (self.q, self.velocity), self.impulses = figure, impulses.copy()
+            back()
+
+    def _attempt(
+        self, time: float, planned: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]
+    ) -> tuple[float, EngineFrame | None]:
+        """A step of at most a time, of `planned` in which things are moved: by how much, and what the things did."""
         model, engine = self._model, self._engine
-        planned, points, began, start = time, self._points(time, moved), self.energy(), self.velocity.copy()
+        points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
         masses_begun = self._inertia(self.q)
-        impulse = self._bounce(masses_begun, points)
+        blow = self._bounce(masses_begun, points)
         time = self._until_impact(points, time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
@@ -142,12 +146,16 @@ class Articulated:
             self.velocity = np.linalg.solve(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
+        unborne = self.velocity
         bearing = self._bear(driven, points, time)
-        impulse = impulse + bearing
+        impulse = blow + bearing
         drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time)
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        work = np.einsum("ij,ij->i", impulse, (points.figure @ (0.5 * (start + after))).reshape(-1, 3))
+        work = sum(
+            np.einsum("ij,ij->i", one, (points.figure @ (0.5 * mean)).reshape(-1, 3))
+            for one, mean in ((blow, start + begin), (bearing, unborne + after))
+        )
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
         paid = float(motor @ moves) + float(work[points.driven].sum())
@@ -155,12 +163,12 @@ class Articulated:
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
         self._settle(began + paid, most, self._brought(drifted))
-        if engine is not None:
-            frame = engine.advance(time, motions)
-            self.frames.append(frame)
-            twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
-            self._react(frame.wrenches, twists, segments)
-        return time
+        if engine is None:
+            return time, None
+        frame = engine.advance(time, motions)
+        twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
+        self._react(frame.wrenches, twists, segments)
+        return time, frame
 
     def _points(self, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, and the joint limits that it can reach."""
@@ -172,15 +180,22 @@ class Articulated:
         speed = max(float(np.abs(one).max(initial=0.0)) for one in [self.velocity, *twists])
         near = workspace.near(self.q, 2e-3 + min(0.2, 1.5 * time * speed))  # m
         rows = self._rows.rows(near)
-        kept = (rows.first > 0) | (rows.second > 0)
+        kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
         contact, wrench = rows.contact[kept], rows.wrench[kept]
         middle = 0.5 * (near.point_a + near.point_b)[contact]
         normal = wrench[:, :3]
         height = (normal * middle).sum(axis=1)
         place = cross(normal, wrench[:, 3:]) + height[:, None] * normal
+        met = [self._owners(near.pair[row]) for row in contact.tolist()]
+        touched = {name for both in met for name in both if name in names}
+        owners, gap = met, rows.gap[kept]
+        if touched and engine is not None:
+            whose, others = engine.contacts(sorted(touched))
+            owners, gap = met + whose, np.concatenate([gap, np.maximum(others.gap, SKIN)])
+            normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
+        bodies = sorted({name for both in owners for name in both if name in names})
         limits = self._limits(time)
-        count = len(contact) + len(limits)
-        bodies = sorted({name for row in contact for name in self._owners(near.pair[row]) if name in names})
+        count = len(owners) + len(limits)
         made = Points(
             np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
             np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
@@ -188,27 +203,14 @@ class Articulated:
         columns = [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
         # pin gives those of a model of one freedom as a vector
         jacobians = np.array([np.zeros((6, model.nv)), *(one.reshape(6, -1) for one in columns)])
-        axes_of = _axes(normal)
-        directions_of = np.concatenate([axes_of, cross(place[:, None], axes_of)], axis=2)
-        moves = directions_of @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
-        made.figure[: 3 * len(contact)] = moves.reshape(-1, model.nv)
-        made.gap[: len(contact)] = rows.gap[kept]
-        for c, row in enumerate(contact.tolist()):
-            axes, directions, here = axes_of[c], directions_of[c], slice(3 * c, 3 * c + 3)
-            owners = self._owners(near.pair[row])
-            made.restitution[c], made.friction[c] = surface_of(self._scene, *owners)
-            for owner, sign in zip(owners, (-1.0, 1.0), strict=True):
-                if owner in names:
-                    b = 6 * bodies.index(owner)
-                    lever = place[c] - engine.centre(owner)  # type: ignore[union-attr]
-                    made.things[here, b : b + 6] += sign * np.hstack([axes, axes @ pin.skew(lever).T])
-                    made.pushes.append((owner, c, place[c], sign * axes))
-                if owner in moved:
-                    before, after = moved[owner]
-                    made.given[here] += sign * directions @ pin.log6(after * before.inverse()).vector / time
-                made.driven[c] |= owner in names or owner in moved
-        for c, (freedom, sign, gap) in enumerate(limits, len(contact)):
-            made.figure[3 * c, freedom], made.gap[c] = sign, gap
+        axes = axes_of(normal)
+        directions = np.concatenate([axes, cross(place[:, None], axes)], axis=2)
+        moves = directions[: len(met)] @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
+        made.figure[: 3 * len(met)] = moves.reshape(-1, model.nv)
+        made.gap[: len(owners)] = gap
+        made.add_owners(self._scene, engine, moved, owners, place, directions, time)
+        for c, (freedom, sign, room) in enumerate(limits, len(owners)):
+            made.figure[3 * c, freedom], made.gap[c] = sign, room
         self.points = count
         return made
 
@@ -368,10 +370,3 @@ class Articulated:
         pushed, first = inertia @ self.velocity, model.idx_vs
         momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
         self._settle(energy, 1.0, momenta)
-
-
-def _axes(normal: Array) -> Array:
-    """(m, 3, 3) normals (m, 3) and two tangents of each, one a row."""
-    first = cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([normal, first, cross(normal, first)], axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices, Mask, cross
+from wholebody.base.arrays import Array, Indices, Mask, cross, with_values
 from wholebody.base.compiled import compiled
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
@@ -18,6 +18,7 @@ from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, Surface, mass_properties, surface
 from wholebody.scene.scene import Scene
 
+TOGETHER = 40  # points of things that share the program of a figure's contacts; more: exact for more things, slower
 HUMAN = MATERIALS["human"]  # of every figure
 
 
@@ -205,6 +206,21 @@ class ContactPoints(NamedTuple):
     normal: Array  # (m, 3) unit normal from A to B
     point: Array  # (m, 3) in the world, between the two surfaces
     gap: Array  # (m,) metres
+
+    def linked(self, bodies: Mask, movable: Mask, things: int, touch: float) -> ContactPoints:
+        """Points of `bodies` (n,), and of what touches them in turn, with the first bodies, which are `things`.
+
+        What touches, with gaps up to `touch` [m], joins if it is `movable` (n,), while all have `TOGETHER` points.
+        """
+        among, linked = (self.bodies < things).all(axis=1), bodies
+        while True:
+            found = among & linked[self.bodies].any(axis=1)
+            joined = linked.copy()
+            joined[self.bodies[found & (self.gap <= touch)]] = True
+            joined &= movable
+            if (joined == linked).all() or found.sum() > TOGETHER:
+                return with_values(self, **{name: part[found] for name, part in self._asdict().items()})
+            linked = joined
 
 
 class ContactFinder:

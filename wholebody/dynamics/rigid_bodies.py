@@ -10,7 +10,7 @@ part of its program.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -25,7 +25,7 @@ from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
 from wholebody.dynamics.joints import Joints
 from wholebody.dynamics.passing import StepStart, check_passing
-from wholebody.dynamics.pieces import ContactFinder, Pieces
+from wholebody.dynamics.pieces import ContactFinder, ContactPoints, Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram, compiled_kernel
 from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
@@ -72,6 +72,7 @@ class RigidBodies:
         compiled_kernel()
         self._pieces, self.state = pieces, BodiesState(scene, pieces)
         self.names, self.notes, self.time = pieces.names, pieces.notes, 0.0
+        self._things = sum(thing.segment is None for thing in scene.objects.values())  # the first of the names
         self._pushed = 0.0  # J: by pushes since the last frame
         self._joints = Joints(scene, pieces)
         self._finder, self._old = ContactFinder(pieces), Impulses.nothing(len(self._joints))
@@ -214,6 +215,27 @@ class RigidBodies:
         self._sleepers.update(self._near, dt)
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
+
+    def contacts(self, names: Collection[str]) -> tuple[list[tuple[str, str]], ContactPoints]:
+        """Points at which bodies with these names, and those that touch them in turn, can touch other things: whose."""
+        linked = np.zeros(len(self.names), dtype=bool)
+        linked[[self._number(name) for name in checks.listed(names, "names", "['ball']")]] = True
+        found = self._finder.points(self._near).linked(linked, self._pieces.dynamic, self._things, 2.0 * SKIN)
+        return [(self.names[a], self.names[b]) for a, b in found.bodies.tolist()], found
+
+    def way_back(self) -> Callable[[], None]:
+        """A function that takes back what is advanced from now on."""
+        state, sleepers = self.state, self._sleepers.way_back()
+        copies, moving = state.copies(), state.bodies.moving.copy()
+        old, falling, pushed, now = self._old, self._falling, self._pushed, self.time
+
+        def back() -> None:
+            state.restore(copies)
+            state.bodies.moving[:] = moving
+            self._old, self._falling, self._pushed, self.time = old, falling, pushed, now
+            sleepers()
+
+        return back
 
     # ---- a step
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask, cross
@@ -34,6 +36,16 @@ class Sleepers:
     def count(self) -> int:
         """How many bodies sleep."""
         return int(self._asleep().sum())
+
+    def way_back(self) -> Callable[[], None]:
+        """A function that takes back what happens from now on."""
+        kept = self._slow_for.copy(), self._island.copy(), self._touched, self._position, self._rotation
+
+        def back() -> None:
+            self._slow_for, self._island = kept[0].copy(), kept[1].copy()
+            self._touched, self._position, self._rotation = kept[2:]
+
+        return back
 
     def _asleep(self) -> Mask:
         return self._state.pieces.dynamic & ~self._state.bodies.moving
