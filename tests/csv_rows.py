@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 
 
 def csv_rows(path: Path) -> list[dict[str, str]]:
     """Return the rows below the facts of the machine."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return list(csv.DictReader(line for line in lines if not line.startswith("# ")))
+    rest = path.read_bytes().decode("utf-8")
+    while rest.startswith("# "):
+        rest = rest.partition("\n")[2]
+    return list(csv.DictReader(io.StringIO(rest, newline="")))  # cells may have line breaks

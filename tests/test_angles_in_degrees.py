@@ -54,28 +54,6 @@ def shown(scene: wb.Scene) -> wb.Viewer:
         lambda scene, q: shown(scene).play([scene.figure.neutral, q]),
         lambda scene, q: shown(scene).ghosts([q]),
     ],
-    ids=[
-        "with_joints",
-        "start",
-        "with_start",
-        "goal",
-        "assess",
-        "clip",
-        "frame",
-        "reduced",
-        "qp step",
-        "newton step",
-        "ccd step",
-        "lift_between",
-        "body_angles",
-        "contacts",
-        "overlapping",
-        "penetration",
-        "sweep",
-        "show",
-        "play",
-        "ghosts",
-    ],
 )
 def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
     with pytest.warns(UserWarning, match=SAID) as told:

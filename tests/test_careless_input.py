@@ -82,17 +82,6 @@ def test_a_thing_that_is_moved_by_millimetres_is_warned_of(person: wb.Figure) ->
     assert scene.objects["ball"].placement.translation[0] == 600.0
 
 
-def test_angles_in_degrees_are_warned_of(person: wb.Figure) -> None:
-    start = person.posture("standing")
-    with pytest.warns(UserWarning, match=r"90 degrees are 1\.571") as warned:
-        person.with_joints(start, {"left_elbow_flexion": 90})
-    assert len(warned) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        q = person.with_joints(start, {"left_elbow_flexion": 3.0})  # a little out of the limits
-    assert 3.0 in q
-
-
 def test_frames_a_second_for_a_time_step_are_warned_of(person: wb.Figure) -> None:
     with pytest.warns(UserWarning, match="give 1 / 60") as warned:
         clip = wb.Clip(person, np.tile(person.posture("standing"), (3, 1)), dt=60, name="clip")

@@ -79,13 +79,10 @@ class Odd(wb.Goal):
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("where", ["error", "jacobian"])
-@pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize("method", ["qp", "dls"])
-def test_terms_of_ones_own_that_no_solver_can_take(
-    method: str, value: float, where: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_terms_of_ones_own_that_no_solver_can_take(method: str, where: str, capfd: pytest.CaptureFixture[str]) -> None:
     scene = wb.Scene(wb.load("avatar"))
-    problem = wb.Problem(scene, goals=[Odd(value, where)])
+    problem = wb.Problem(scene, goals=[Odd(np.nan, where)])
     with suppress(wb.WholebodyError):
         wb.solve(problem, method=method)
     assert capfd.readouterr().out == ""

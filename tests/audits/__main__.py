@@ -39,7 +39,7 @@ def newton(arguments: argparse.Namespace) -> None:
     repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
     facts, many = machine(), 10 * repeats
     paper = [newton.paper_row(many), newton.drag_of_assembly_row(many)]
-    solves = [*paper, newton.nearest_row(many), *newton.loop_rows(many)]
+    solves = [*paper, *newton.loop_rows(many)]
     agreements = newton.agreement_rows(many)
     drags = [newton.drag_row(frames, contacts) for contacts in (False, True)]
     linear = list(newton.linear_rows(sizes, repeats))
@@ -180,27 +180,6 @@ def loads(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
-    "clip-constants",
-    "what each constant of the methods of `wb.avoid` is worth",
-    "Halve and double one constant at a time, and free clips that need no recordings.",
-    listed("--only", "modules of wholebody.motion (default: all that are looked at)", "MODULE"),
-)
-def clip_constants(arguments: argparse.Namespace) -> None:
-    """Measure and report; --quick takes two clips."""
-    from tests.audits import clip_constants as ablated
-    from wholebody.figures import load
-
-    only = chosen(arguments.only, ablated.USED, "--only")
-    cases = ablated.CASES[-2:] if arguments.quick else ablated.CASES
-    facts, rows = machine(), ablated.ablation(load("human"), print, cases, only)
-    shown = [row for row in rows if ablated.matters(row)]
-    unnoticed = sorted({row.case for row in rows} - {row.case for row in shown})
-    about = "Constants of `wb.avoid`, halved and doubled on clips: changes, summed over the cases."
-    text = report(about, {"": shown}, facts, [f"changes nothing: {name}" for name in unnoticed])
-    publish("clip-constants", text, arguments, facts=facts, tables={"clip-constants": rows}, page=None)
-
-
-@measuring(
     "detail",
     "levels of modelling",
     "Solve problems with the person as spheres, capsules and hulls, with all pairs and with those "
@@ -265,22 +244,6 @@ def robots(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
-    "pen",
-    "things that move by themselves for minutes",
-    "Let dominoes, stacks and balls move in a pen, where a ball is kicked every ten seconds.",
-    option("--minutes", type=float, default=10.0, metavar="N", help="simulated (default: 10)"),
-)
-def pen(arguments: argparse.Namespace) -> None:
-    """Measure; --quick takes three seconds."""
-    from tests.audits.pen import long_run
-
-    minutes = 0.05 if arguments.quick else number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
-    facts, row = machine(), long_run(minutes)
-    text = report("Dominoes, stacks and balls in a pen; a ball is kicked every ten seconds.", {"": [row]}, facts)
-    publish("pen", text, arguments, facts=facts, tables={"pen": [row]}, page=None)
-
-
-@measuring(
     "plans",
     "planned motions by scene, beside RRT-Connect of OMPL where it is installed",
     "Plan motions of arms, people, a G1 (in the folder WHOLEBODY_ROBOTS) and a hand with several seeds.",
@@ -329,7 +292,7 @@ def postures(arguments: argparse.Namespace) -> None:
     publish("postures", text, arguments, facts=facts, tables={"postures": rows}, page=None)
 
 
-COMMANDS = (newton, qp, human, postures, regress, loads, clip_constants, detail, ablation, robots, pen, plans)
+COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans)
 
 
 def main(words: Sequence[str] | None = None) -> int:

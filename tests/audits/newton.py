@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -203,22 +202,6 @@ def loop_rows(repeats: int) -> list[SolveRow]:
         made.point_goal("b50", made.placement("b50").translation + np.array((0.02, 0.01, 0.03)))
         rows.append(assembly_row(name, made, repeats))
     return rows + [figure_row(name, problem, repeats) for name, problem in _hands_problems()]
-
-
-def nearest_row(repeats: int) -> SolveRow:
-    """The nearest place by Newton on the KKT system, whose last errors show the order of convergence."""
-    made = ring(30)
-    made.point_goal("b0", made.placement("b0").translation + np.array((-0.1, 0.06, 0.15)))
-    start = made.variables()
-
-    def solve() -> Any:
-        made.place(start)
-        return made.solve(tolerance=1e-9, nearest=True)
-
-    found, us = solve(), median_us(solve, max(3, repeats // 10))
-    more = len(found.nearness)
-    case, counts = "nearest place of a ring of 30", (found.iterations + more - 1, found.systems + more)
-    return _solve_row(case, made.system().pattern, counts, us, found.nearness)
 
 
 def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:

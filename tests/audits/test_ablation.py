@@ -33,7 +33,7 @@ def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
 
 
 def test_only_problems_that_the_method_takes_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ablation, "SETS", {name: SETS[name] for name in ("balance", "robot_arm", "drag")})
+    monkeypatch.setattr(ablation, "SETS", {name: SETS[name] for name in ("balance", "robot_arm")})
     monkeypatch.setattr(ablation, "NAMED", {})
     solver = wb.methods.CCD()
     asked = ablation.problems(1, "ccd")

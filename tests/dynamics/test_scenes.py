@@ -13,7 +13,7 @@ from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_worl
 
 
 @cache
-def played(name: str, share: float = 1.0) -> tuple[float, list[WorldFrame]]:
+def played(name: str, share: float) -> tuple[float, list[WorldFrame]]:
     """Energy of a scene at its start, joules, and its frames, or the first of them."""
     scene = build_world_scene(name)
     if share < 1.0:
@@ -24,7 +24,7 @@ def played(name: str, share: float = 1.0) -> tuple[float, list[WorldFrame]]:
 
 
 def test_the_finger_flicks_the_ball_off_the_table() -> None:
-    _, frames = played("flick")
+    _, frames = played("flick", 1.0)
     first, last = frames[0].placements["ball"].translation, frames[-1].placements["ball"].translation
     assert first == pytest.approx([0.3, 0.0, 0.77], abs=1e-3)
     assert last[0] > 0.8  # beyond the edge at 0.4
@@ -40,7 +40,7 @@ def test_the_finger_flicks_the_ball_off_the_table() -> None:
 
 
 def test_one_domino_fells_all() -> None:
-    _, frames = played("dominoes")
+    _, frames = played("dominoes", 1.0)
     upright = [frame.placements["domino 12"].rotation[2, 2] for frame in frames]
     assert upright[0] == pytest.approx(1.0, abs=1e-6)
     for number in range(1, 13):

@@ -30,30 +30,6 @@ def flat(table: tuple) -> list[int]:
     return [table] if isinstance(table, int) else [value for row in table for value in flat(row)]
 
 
-def test_every_combination_of_a_table_has_an_entry() -> None:
-    assert len(flat(published("rula")["A"])) == 6 * 3 * 4 * 2
-    assert len(flat(published("rula")["B"])) == 6 * 6 * 2
-    assert len(flat(published("rula")["C"])) == 8 * 7
-    assert len(flat(published("reba")["A"])) == 60  # the 144 combinations of the paper: 60 of group A, 36 of group B
-    assert len(flat(published("reba")["B"])) == 36
-    assert len(flat(published("reba")["C"])) == 144
-    assert [len(row) for back in published("owas")["categories"] for row in back] == [21] * 12  # 252 of the paper
-
-
-def test_worse_parts_never_lower_a_score() -> None:
-    """Each table grows along each of its axes."""
-    for table in (
-        published("rula")["A"],
-        published("rula")["C"],
-        published("reba")["A"],
-        published("reba")["B"],
-        published("reba")["C"],
-    ):
-        values = np.array(table)
-        for axis in range(values.ndim):
-            assert (np.diff(values, axis=axis) >= 0).all()
-
-
 @pytest.mark.parametrize(
     ("parts", "a", "b", "score"),
     [

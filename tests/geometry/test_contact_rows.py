@@ -25,12 +25,9 @@ SHAPES = {
 }
 GAPS = {
     "apart": 0.03,
-    "near": 0.002,
     "touching": 2e-5,
     "touching inside": -2e-5,
-    "1 mm in": -0.001,
     "1 cm in": -0.01,
-    "5 cm in": -0.05,
 }
 
 

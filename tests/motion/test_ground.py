@@ -106,6 +106,13 @@ def slides(clip: wb.Clip, stands: dict[str, np.ndarray]) -> np.ndarray:
     return np.concatenate(found)
 
 
+def test_feet_that_pass_each_other_between_two_frames_do_not_overlap(human: wb.Figure, shared_data: Path) -> None:
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_03.bvh")  # a run, at 30 Hz
+    found = wb.check(wb.retarget(motion, human), wb.Scene(human).add(wb.HalfSpace(), name="floor"))
+    assert found.colliding == 0
+    assert found.deepest_between < 2e-3
+
+
 @pytest.mark.parametrize("height", [flat, stairs, rocks])
 def test_feet_rest_where_they_do(height: Terrain) -> None:
     motion, stands = walker(height)
@@ -211,7 +218,7 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     standing = human.grounded(human.posture("standing"), wb.Scene(human).add(wb.HalfSpace(), name="floor"))
     sunk = standing.copy()
     sunk[2] -= 0.03
-    clip = wb.Clip(human, np.tile(sunk, (5, 1)), DT)
+    clip = wb.Clip(human, np.tile(sunk, (3, 1)), DT)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     with pytest.warns(UserWarning, match=r"left_foot stands up to 30 mm inside floor.*hold_feet=False"):
         held = wb.avoid(clip, scene, method="frames").report
@@ -221,7 +228,7 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
 
 def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) -> None:
     floor = wb.Scene(human).add(wb.HalfSpace(), name="floor")
-    clip = wb.Clip(human, np.tile(human.grounded(human.posture("standing"), floor), (5, 1)), DT)
+    clip = wb.Clip(human, np.tile(human.grounded(human.posture("standing"), floor), (3, 1)), DT)
     skate = wb.Box((0.2, 0.02, 0.04))
     floor.attach(skate, to="left_foot", name="skate", at=(0.05, 0.0, -0.09), rests_on=["left_foot", "left_toes"])
     with pytest.warns(UserWarning, match=r"skate stands up to \d+ mm inside floor.*hold_feet=False"):
@@ -288,15 +295,10 @@ def nowhere(count: int) -> dict[str, np.ndarray]:
         ({"rests": {"tail": np.ones(60, dtype=bool)}}, "rests: no role is called 'tail'"),
         ({"rests": {"left_toe": [True], "left_ankle": [True, False]}}, r"left_toe 1, left_ankle 2\); give one for"),
         ({"rests": None}, "rests is a NoneType, not a Mapping; give role to value"),
-        ({"footholds": ((0,),)}, r"footholds\[0\] is a tuple, not a Foothold; give one of wb.motion.ground"),
         ({"footholds": (Foothold("left_toe", 5, 5, np.zeros(3), 0.0),)}, r"end is 5; give a whole number between 6"),
-        ({"footholds": (Foothold("left_toe", 0, 5, np.zeros(3), np.nan),)}, "height is nan; give a finite number"),
         ({"lowest": {"left_toe": np.nan}}, "lowest of left_toe is nan; give a finite number"),
-        ({"lowest": np.full(3, np.nan)}, "lowest is a ndarray, not a Mapping"),
         ({"levels": (np.nan,)}, "a level is nan; give a finite number"),
-        ({"tilt": np.nan}, "tilt is nan; give a finite number between 0 and 90 degrees"),
         ({"uneven": "x"}, "uneven is 'x'; give True or False"),
-        ({"dt": 0.0}, "dt is 0"),
     ],
 )
 def test_a_changed_ground_is_checked(change: dict[str, Any], sentence: str) -> None:

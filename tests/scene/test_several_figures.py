@@ -288,7 +288,8 @@ def test_a_clip_of_several_has_parts(tmp_path: Path, pair: wb.Scene, anna: wb.Fi
 
 
 @pytest.mark.parametrize("ending", [".csv", ".bvh", ".glb"])
-def test_a_file_holds_several_figures(tmp_path: Path, ending: str, pair: wb.Scene) -> None:
+def test_a_file_holds_several_figures(tmp_path: Path, ending: str, ben: wb.Figure) -> None:
+    pair = wb.Scene({"anna": ben, "ben": (ben, TURNED)})
     pair.add_figure(wb.load("hand"), name="hand", at=(0.3, 2.0, 1.0, 0.0, 0.0, 0.6, 0.8), root="fixed")
     figure = pair.figure
     turned = pin.integrate(figure.model, figure.neutral, 0.2 * np.random.default_rng(3).normal(size=figure.model.nv))

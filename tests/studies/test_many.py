@@ -70,15 +70,12 @@ def test_a_cluster_answers_many_goals_of_a_scene_at_once_as_this_process_does(ar
         np.testing.assert_array_equal(one.q, other.q)
 
 
-@pytest.mark.parametrize("stopped", [1, 20])
-def test_runs_that_were_ended_and_go_on_answer_as_those_that_were_not(
-    arm: wb.Figure, tmp_path: Path, stopped: int
-) -> None:
-    """Among the first cases of three runs, of which the second is out of reach, and in the midst of a run."""
+def test_runs_that_were_ended_and_go_on_answer_as_those_that_were_not(arm: wb.Figure, tmp_path: Path) -> None:
+    """Among the first cases of three runs, of which the second is out of reach."""
     places = [(0.4, 0.01 * k - 0.2, 0.5) if k != 16 else (3.0, 0.0, 0.5) for k in range(34)]
     problems = [problem(arm, place, measures=[wb.Effort()]) for place in places]
     whole = wb.solve_many(problems, warm_start=True)
-    some = wb.solve_many(problems, warm_start=True, folder=tmp_path, progress=lambda told: told.done >= stopped)
+    some = wb.solve_many(problems, warm_start=True, folder=tmp_path, progress=lambda told: told.done >= 1)
     assert 0 < sum(one.q is not None for one in some) < len(problems)
     for one, other in zip(wb.solve_many(problems, warm_start=True, folder=tmp_path), whole, strict=True):
         np.testing.assert_array_equal(one.q, other.q)

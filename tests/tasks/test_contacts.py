@@ -19,7 +19,11 @@ SEAT = 0.40  # m: top of the seat
 
 @pytest.fixture(scope="module")
 def scene() -> wb.Scene:
-    made = wb.Scene(wb.load("human", sex="male", stature=1.75))
+    return _furnished(wb.load("human", sex="male", stature=1.75))
+
+
+def _furnished(figure: wb.Figure) -> wb.Scene:
+    made = wb.Scene(figure)
     made.add(wb.HalfSpace(), name="floor")
     made.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, SEAT - 0.02))
     made.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.57, 0.0, 0.82))
@@ -43,6 +47,39 @@ TERMS = {
     "palm_side": wb.Grasp("right_hand", "box", side=(0, 0, 1)),
     "power": wb.Grasp("right", "bar", "power"),
 }
+OFTEN = {
+    **TERMS,
+    "on_a_tray": wb.Stand("tray", balance=False),
+    "sit_on_a_tray": wb.Sit("tray"),
+    "still": wb.Posture("sitting"),
+    "comfort": wb.tasks.Discomfort(),
+    "low": wb.tasks.PotentialEnergy(),
+}
+
+
+@pytest.mark.parametrize("name", OFTEN)
+def test_a_term_is_the_same_whatever_was_stated_before(name: str) -> None:
+    # what does not follow from the start is kept with the scene; a tray in the hand turns with the start
+    figure, rng = wb.load("human", sex="male", stature=1.75), np.random.default_rng(5)
+    tray = wb.Box((0.3, 0.2, 0.02))
+    used, anew = (_furnished(figure).attach(tray, to="right_palm", name="tray", at=(0.1, 0.0, 0.05)) for _ in range(2))
+    start = pin.integrate(figure.model, figure.posture("standing"), 0.2 * rng.normal(size=55))
+    OFTEN[name].resolve(used, figure.posture("sitting"))
+    for scene in (used, anew):
+        for thing, place in (
+            ("floor", (0.0, 0.0, 0.05)),
+            ("seat", (-0.3, 0.1, 0.5)),
+            ("tray", (0.1, 0.0, 0.05, 0.6, 0.0, 0.0, 0.8)),
+        ):
+            scene.move(thing, at=place)
+    OFTEN[name].resolve(used, figure.posture("arms_forward"))
+    terms: list[Any] = [OFTEN[name].resolve(scene, start) for scene in (used, anew)]
+    for q in (start, figure.posture("sitting")):
+        here = State(figure.model).update(q)
+        values = [term.value(here) if hasattr(term, "value") else term.error(here) for term in terms]
+        np.testing.assert_array_equal(*values)
+
+
 HALF = 2e-6  # m, rad: half of a difference; coal's distances are good to 1e-9
 
 
@@ -318,14 +355,13 @@ COLLISION = '<collision><origin xyz="0.06 0 0"/><geometry><sphere radius="0.03"/
     ],
     ids=["own pieces", "drawn", "drawn cylinder", "mass alone", "pieces of a fixed child", "bare frame"],
 )
-@pytest.mark.parametrize("joints", ["all", "shoulder"])
 def test_a_link_at_a_fixed_joint_touches_with_its_surface(
-    tmp_path: Any, wrist: str, hand: str, part: str, along: float, radius: float, joints: str
+    tmp_path: Any, wrist: str, hand: str, part: str, along: float, radius: float
 ) -> None:
     """By its pieces, by what is drawn of it, or by what moves with it; a frame without a body by its origin."""
     path = tmp_path / "arm.urdf"
     path.write_text(ARM.format(wrist=wrist, hand=hand))
-    figure = wb.load(path).reduced(joints)
+    figure = wb.load(path).reduced("shoulder")
     scene = wb.Scene(figure).add(wb.HalfSpace(offset=-0.4), name="table")
     found = wb.solve(wb.Problem(scene, goals=[wb.Touch(part, "table")]))
     assert found.status == "solved", found.message
@@ -366,7 +402,7 @@ def test_knees_that_are_no_feet_are_refused(knees: Any) -> None:
         wb.Problem(scene, constraints=[wb.Stand("floor", knees=knees)])
 
 
-@pytest.mark.parametrize("percentile", [5, 50, 95])
+@pytest.mark.parametrize("percentile", [5, 95])
 def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_any_start(percentile: int) -> None:
     # The ankle of a small woman who stands is as near to the floor as a knee that is thick.
     woman = wb.load("human", sex="female", percentile=percentile)
@@ -380,9 +416,8 @@ def test_who_kneels_on_one_knee_has_the_thigh_level_and_the_trunk_upright_from_a
         assert woman.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(15.0))
 
 
-@pytest.mark.parametrize("sex", ["female", "male"])
-def test_a_foot_stands_on_a_rung_with_the_middle_of_its_sole(sex: str) -> None:
-    person, level = wb.load("human", sex=sex), (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+def test_a_foot_stands_on_a_rung_with_the_middle_of_its_sole() -> None:
+    person, level = wb.load("human", sex="female"), (0.5**0.5, 0.0, 0.0, 0.5**0.5)
     scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Cylinder(0.015, 0.5), name="rung", at=(0.3, -0.1, 0.3, *level))
     stands = [wb.Stand("floor", feet=["left_foot"]), wb.Stand("rung", feet=["right_foot"], balance=False)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-import numpy as np
 import pytest
 
 from wholebody import InputError, tasks
@@ -18,31 +17,16 @@ NAN = float("nan")
     ("make", "message"),
     [
         (lambda: tasks.Point("tip", (550.0, -250.0, 950.0)), r"Point\('tip'\): target is 1126 m away; .* millimetres"),
-        (lambda: tasks.Point("tip", (1e200, 0, 0)), r"target is 1e\+200 m away"),  # whose square is no number
         (lambda: tasks.Point("tip", (0.0, NAN, 0.0)), r"Point\('tip'\): target is .*nan.*; give finite numbers"),
         (lambda: tasks.Point("tip", (0.0, 1.0)), r"Point\('tip'\): target has shape \(3,\), not \(2,\)"),
-        (lambda: tasks.Point("tip", "here"), r"Point\('tip'\): target is 'here', not numbers"),
-        (lambda: tasks.Point("tip", (0, 0, 0), offset=(0, 0)), "offset has shape"),
-        (lambda: tasks.Point("tip", (0, 0, 0), weight=0), "weight is 0; give a positive number"),
         (lambda: tasks.Point("tip", (0, 0, 0), weight=-1), "weight is -1; give a positive number"),
-        (lambda: tasks.Point("tip", (0, 0, 0), weight=NAN), "weight is nan; give a positive number"),
         (lambda: tasks.Frame("tip", (0, 0, 0, 0, 0, 0, 2)), r"Frame\('tip'\): target.*quaternion"),
-        (lambda: tasks.Frame("tip", (0, 0, 2000.0)), "2000 m away"),
-        (lambda: tasks.Frame("tip", (0, 0)), r"Frame\('tip'\)"),
-        (lambda: tasks.Orientation("tip", (0, 0, 0)), "takes a quaternion"),
         (lambda: tasks.Orientation("tip", (0, 0, 0, 0.5)), "quaternion"),
-        (lambda: tasks.Orientation("tip", np.diag([1.0, 1.0, -1.0])), r"Orientation\('tip'\)"),
         (lambda: tasks.Axis("tip", (1, 0, 0)), "either a direction or a place"),
-        (lambda: tasks.Axis("tip", (1, 0, 0), direction=(0, 0, 1), toward=(0, 0, 1)), "either a direction or a place"),
         (lambda: tasks.Axis("tip", (0, 0, 0), direction=(0, 0, 1)), "axis is .* has no direction"),
-        (lambda: tasks.Axis("tip", (1, 0, 0), toward=(0, 0, 1e3)), "1000 m away"),
         (lambda: tasks.CenterOfMass((0, 0, 0), axes="z"), "axes is 'z'"),
-        (lambda: tasks.Plane("tip", (0, 0, 0)), "no direction"),
         (lambda: tasks.Plane("tip", (0, 0, 1), side="below"), "side is 'below'; give 'on' or 'above'"),
-        (lambda: tasks.Hold("tip", (0, 0, NAN)), r"Hold\('tip'\): at"),
         (lambda: tasks.Effort(0.0), "Effort: weight is 0"),
-        (lambda: tasks.Discomfort("much"), "Discomfort: weight is 'much'; give a positive"),
-        (lambda: tasks.PotentialEnergy(-1.0), "PotentialEnergy: weight is -1"),
         (lambda: tasks.Displacement(NAN), "Displacement: weight is nan"),
     ],
 )

@@ -52,22 +52,11 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
             "line 1: no column .*'thumb'",
         ),
         (lambda lines: [line.partition(",")[2] for line in lines], "line 1: the columns lack time"),
-        (lambda lines: [lines[0].replace("root_qw", "time_2"), *lines[1:]], "line 1: no column is called 'time_2'"),
-        (
-            lambda lines: [",".join(line.split(",")[:1] + line.split(",")[2:]) for line in lines],
-            "columns lack root_x",
-        ),
         (lambda lines: [line.replace(".", "\0").replace(",", ";").replace("\0", ",") for line in lines], "semicolons"),
         (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values for 26 columns"),
         (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is not a number"),
         (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
         (lambda lines: lines[:2], "line 2: .*at least two frames"),
-        (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step changes"),
-        (
-            lambda lines: [lines[0], *(f"{k}e-9,{line.partition(',')[2]}" for k, line in enumerate(lines[1:]))],
-            "line 3: the time step is 1e-09 s; give one between 1e-6 and 1e6 s",
-        ),
-        (lambda lines: [lines[0], *lines[:0:-1]], "line 3: the time step is -"),
         (
             lambda lines: [*lines[:3], "", lines[3].rsplit(",", 1)[0] + ",nan", *lines[4:]],
             "line 5: right_thumb_ip_flexion is nan; 1 values",
@@ -77,11 +66,6 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
             "line 1: the column root_x occurs twice",
         ),
         (lambda lines: [*lines[:2], "9" * 140_000 + lines[2], *lines[3:]], "line 3: is not CSV .*field larger"),
-        (lambda lines: [*lines[:2], "", "inf" + lines[2], *lines[3:]], "line 4: '?inf.* not a number|line 4: the time"),
-        (
-            lambda lines: [*lines[:2], *(f"1e999,{line.partition(',')[2]}" for line in lines[2:])],
-            "line 3: the time is inf",
-        ),
         (lambda lines: [lines[0], *(line.rsplit(",", 1)[0] + ",1e200" for line in lines[1:])], "line 2: .*beyond 1e"),
     ],
 )

@@ -87,10 +87,9 @@ def test_a_picture_does_not_depend_on_those_before(tmp_path: Path, monkeypatch: 
     problem = wb.Problem(scene, first, goals=[wb.Point("right_index_tip", tip)])
     with Viewer(scene) as viewer, Viewer(scene) as fresh:
         viewer.show(first, problem=problem)
-        viewer.picture(tmp_path / "one.png", size=(160, 120))
-        opened.clear()
-        viewer.play([first, second, first], dt=0.1)
+        viewer.play([first, second], dt=0.1)
         viewer.movie(tmp_path / "movie.gif", size=(96, 64))
+        opened.clear()
         viewer.show(second, problem=problem)
         viewer.picture(tmp_path / "two.png", size=(200, 120))
         assert not opened

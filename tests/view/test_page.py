@@ -88,8 +88,6 @@ def test_the_live_page_follows_and_a_late_one_catches_up(
         as_pinocchio_says(exhibit, exhibit.posture(40))
         assert [entry["text"] for entry in nodes(["/names/table", "/names/egg"])] == ["table", "egg"]
         assert nodes(["/names/floor"]) == [None]
-        browser.evaluate("location.href = 'about:blank'")
-        assert viewer.wait_until_closed(10.0)
 
 
 def test_things_that_come_and_go(exhibit: Any, browser: Browser, as_pinocchio_says: Any, nodes: Any) -> None:

@@ -160,7 +160,6 @@ def test_waiting_without_a_browser_ends_and_leaves_the_viewer_working(exhibit: A
         assert not viewer.wait(0.2)
         viewer.show(exhibit.posture(1))
         assert viewer.sync(10.0)
-        assert viewer.wait_until_closed(10.0)
 
 
 def test_two_viewers_have_two_addresses(exhibit: Any) -> None:

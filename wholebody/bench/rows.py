@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import gc
-import io
 import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,8 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from wholebody.base.errors import FileFormatError
-from wholebody.base.files import packaged_toml, read_text
+from wholebody.base.files import packaged_toml
 from wholebody.bench import plot_style
 from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import formatted, sentence
@@ -83,38 +80,6 @@ def table(rows: Sequence[Row]) -> str:
 def in_words(row: Row) -> str:
     """A row in one line."""
     return f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}"
-
-
-def read_rows(path: Path) -> tuple[dict[str, str], list[Row]]:
-    """The facts and the rows that `write_rows` wrote, without empty figures; FileFormatError for another file."""
-    facts: dict[str, str] = {}
-    rest = read_text(path, "table")
-    while rest.startswith("# "):
-        line, _, rest = rest.partition("\n")
-        name, _, value = line[2:].removesuffix("\r").partition(": ")
-        facts[name] = value
-    try:
-        heads, *lines = csv.reader(io.StringIO(rest, newline=""))  # cells may have line breaks
-    except (csv.Error, ValueError) as error:
-        raise FileFormatError(f"{path}: is not CSV ({error}); measure again") from None
-    if heads[:2] != ["case", "tool"]:
-        raise FileFormatError(f"{path}: the columns are {', '.join(heads)[:200]}, not case, tool, ...; measure again")
-    for number, cells in enumerate(lines, start=1):
-        if len(cells) != len(heads):
-            raise FileFormatError(f"{path}: row {number} has {len(cells)} cells of {len(heads)}; measure again")
-    return facts, [
-        Row(case, tool, {name: _figure(cell) for name, cell in zip(heads[2:], cells, strict=True) if cell})
-        for case, tool, *cells in lines
-    ]
-
-
-def _figure(cell: str) -> int | float | str:
-    for kind in (int, float):
-        try:
-            return kind(cell)
-        except ValueError:
-            pass
-    return cell
 
 
 def only(rows: Sequence[Row], *names: str) -> list[Row]:

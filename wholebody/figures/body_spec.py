@@ -254,11 +254,13 @@ def _convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
     return piece.geometry, piece.placement
 
 
+@lru_cache(maxsize=256)  # of the figures that were loaded last: hulls take most of the time to load a hand
 def ellipsoid(radii: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron with its vertices on an ellipsoid, axes along x, y, z, centre at the origin."""
     return _convex(unit_sphere() * np.array(radii), what)
 
 
+@lru_cache(maxsize=256)
 def tapered(radius_start: float, radius_end: float, length: float, what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a tapered capsule along -z: vertices on a ball at the origin and on one at -length."""
     ball = unit_sphere()

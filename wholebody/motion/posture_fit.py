@@ -6,12 +6,13 @@ A step dq minimises, over joint limits, the greatest motion of a frame, reach co
 
 with p the points and B their differences along bones, so that a body is moved as a whole at no cost to its bones; R
 orientations; h points that are held; q* a posture to stay near to. Contacts are rows ``gap + J dq >= clearance`` of all
-pairs that are near, relaxed at a high price. Joint limits hold exactly, cones to second order of the last step.
+pairs that are near, relaxed at a high price, and of those at given places of motions to other frames, at a lower one.
+Joint limits hold exactly, cones to second order of the last step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import daqp
@@ -20,6 +21,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
+from wholebody.motion.held_points import HeldPoint
+from wholebody.motion.retarget_targets import LIMBS, has_trunk, known_bones
+from wholebody.motion.roles import Roles
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.residual_kernel import cones as cone_angles
 
@@ -27,10 +31,14 @@ STEP = 0.6  # rad: largest change of a joint in one step; beyond it the linearis
 CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
 DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
 WITHIN, CLEARANCE = 0.06, 5e-4  # m: nearer pairs have rows; distance that they keep
+PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
 LEAST_LEVER = 0.1  # m
 WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
+ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
+BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
+TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the program digits
 
 
@@ -43,6 +51,15 @@ class Goals(NamedTuple):
     held_weights: Array  # (h, 3) weight of each, along the axes of the world; 0 for none
     posture: Array  # (nq,) a posture to stay near to
     posture_weights: Array  # (nv,) weight of each difference from it, metres per radian
+
+
+class Midway(NamedTuple):
+    """A place on the motion from a posture to that of a frame beside it."""
+
+    other: Array  # (nq,) the posture beside it
+    share: float  # of the way to that
+    part: float  # of what is missing there, that the posture is to give way
+    weight: float  # of what is missing: 1 is that of a bone
 
 
 class Layout(NamedTuple):
@@ -116,9 +133,9 @@ class Fitter:
         self._state.update(q)
         return bool((self._cone_angles() < -CONE_SLACK).any())
 
-    def overlaps(self, q: Array) -> bool:
-        """Whether a pair overlaps at a posture (nq,) by more than the clearance that rows ask for."""
-        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) < -CLEARANCE)
+    def overlaps(self, q: Array, depth: float = CLEARANCE) -> bool:
+        """Whether a pair overlaps at a posture (nq,) by more than a depth, metres."""
+        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) < -depth)
 
     def cost(self, q: Array, goals: Goals) -> float:
         """Half the sum of the squared weighted errors."""
@@ -128,7 +145,14 @@ class Fitter:
         return 0.5 * float(errors @ errors + posture @ posture)
 
     def step(
-        self, q: Array, goals: Goals, *, damping: float = DAMPING, among: bool = True, most: Array | None = None
+        self,
+        q: Array,
+        goals: Goals,
+        *,
+        damping: float = DAMPING,
+        among: bool = True,
+        most: Array | None = None,
+        midway: Sequence[Midway] = (),
     ) -> Array:
         """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`."""
         self._state.update(q)
@@ -154,6 +178,13 @@ class Fitter:
             found = self._workspace.rows.rows(near, CLEARANCE)
             limits.append(self._state.rows(found.wrench, found.second, found.first))
             least.append(np.minimum(CLEARANCE - found.gap, PUSH))
+        for other, share, part, weight in midway:
+            self._state.update(pin.interpolate(self.model, q, other, share))
+            found = self._workspace.rows.rows(self._workspace.proximity.query(self._state.data, PASSING), SPARE)
+            pull = weight * RELAXED**0.5  # what a row is multiplied by, its price is by the square of
+            missing = SPARE - found.gap
+            limits.append(pull * (1.0 - share) * self._state.rows(found.wrench, found.second, found.first))
+            least.append(pull * np.minimum(np.where(missing > 0.0, part, 1.0) * missing, PUSH))
         among_rows, low = np.concatenate(limits), np.concatenate(least)
         sense = np.zeros(len(lower) + len(low), dtype=np.int32)
         sense[len(lower) :] = SOFT
@@ -164,6 +195,16 @@ class Fitter:
         if flag <= 0:
             return q
         return self.figure.clamp(np.asarray(pin.integrate(self.model, q, np.asarray(x))))
+
+    def reached(self, before: Array | None, q: Array, most: Array) -> Array:
+        """The posture nearest to q (nq,) that is at most (nv,) from the posture before in time."""
+        q = self.figure.clamp(q)
+        if before is None:
+            return q
+        way = np.asarray(pin.difference(self.model, before, q))
+        if (np.abs(way) <= most).all():
+            return q
+        return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -most, most)))
 
     def descend(self, q: Array, goals: Goals, iterations: int) -> tuple[Array, float]:
         """The posture (nq,) of least cost that a descent from q finds, without regard to contacts, and its cost."""
@@ -236,3 +277,32 @@ def levers(figure: Figure) -> Array:
         found[:3] = 1.0
         found[:6] *= np.repeat(WHOLE, 3)
     return found
+
+
+def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
+    """The bones between points of roles, the anchor or what else says where they are, and orientations of roles."""
+    own, place = roles.places(figure), {role: np.eye(len(points))[k] for k, role in enumerate(points)}
+    for part in ("hip", "shoulder"):
+        if {f"left_{part}", f"right_{part}"} <= place.keys():
+            place[f"{part}s"] = 0.5 * (place[f"left_{part}"] + place[f"right_{part}"])
+    trunk = [
+        ("left_hip", "right_hip"),
+        ("hips", "shoulders"),
+        ("left_shoulder", "right_shoulder"),
+        ("shoulders", "head"),
+    ]
+    limbs = [ends for limb in LIMBS for side in ("left", "right") for ends in known_bones(limb, side, points)]
+    pairs = [ends for ends in trunk + limbs if set(ends) <= place.keys()]
+    rows = [place[end] - place[start] for start, end in pairs]
+    weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
+    if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
+        rows.append(place["hips"])
+        weights.append(ANCHOR)
+    else:  # what is known says where it is
+        rows += [place[role] for role in points]
+        weights += [1.0] * len(points)
+    return Layout(
+        [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
+        np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
+        [(point.joint, point.place, point.base) for point in held],
+    )  # fmt: skip

@@ -12,6 +12,9 @@ by successive over-relaxation (Young 1954): a sweep seeks d_k + omega (d_k* - d_
 first pass and first sweeps take every second or fourth frame of a fast recording, so that a contact is felt equally far
 ahead at every rate; the frames between are interpolated, and swept after (nested iteration; Briggs, Henson and
 McCormick, A Multigrid Tutorial, 2000). The body begins to give way before a contact comes.
+
+Postures that are free may have motions between them that are not: feet pass each other in a thirtieth of a second. The
+last sweeps have contact rows there too, and so have sweeps after them of the frames about such motions alone.
 """
 
 from __future__ import annotations
@@ -24,16 +27,21 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
-from wholebody.motion.held_points import HeldPoint
+from wholebody.motion.faults import DIP
 from wholebody.motion.holds import Holds
-from wholebody.motion.posture_fit import Fitter, Goals, Layout, levers
-from wholebody.motion.retarget_targets import LIMBS, Targets, Wanted, has_trunk, known_bones, parts_of
+from wholebody.motion.posture_fit import Fitter, Goals, Midway, layout_of, levers
+from wholebody.motion.retarget_targets import Targets, Wanted, has_trunk, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
-from wholebody.motion.windows import normal
+from wholebody.motion.windows import leaning, normal
 from wholebody.scene.workspace import Workspace
 
-FIRST, FREE, PASS, SWEEP = 60, 2, 3, 1  # most steps of a first frame, a free one, one of the first pass, one of a sweep
+FIRST, FREE, FORWARD, SWEEP = (
+    60,
+    2,
+    3,
+    1,
+)  # most steps of a first frame, a free one, one of the first pass, one of a sweep
 EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
@@ -42,17 +50,18 @@ STARTS = 4  # how often the first frame is solved, each time from where soles ca
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
 FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
-ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
 CHANGE = 0.055  # s^0.5, weight of a change of the deviation in the first pass, over the root of the time step
 BEND = 0.067  # s², weight of an acceleration of the deviation in sweeps, in metres that limbs move
 GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a deviation that nothing needs
 EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
+# s², weight of overlaps between frames over the square of the time step: less than of what rests, which they would move
+PASS = 0.8
+LATE = 1.3  # omega of sweeps that look at motions between frames: earlier ones are far from where these will be
+MENDED = 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
-BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
-TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 
 
 class Run:
@@ -72,7 +81,7 @@ class Run:
         self.free = list[Array]() if free is None else free
         self.figure, self.model, self.dt, self.holds = figure, figure.model, dt, holds
         points, turns = parts_of(targets, roles)
-        self.fitter = Fitter(figure, _layout(points, turns, roles, figure, holds.points if holds else []), workspace)
+        self.fitter = Fitter(figure, layout_of(points, turns, roles, figure, holds.points if holds else []), workspace)
         self.hips = [k for k, role in enumerate(points) if role.endswith("hip")] or [0]
         self.led = figure.root == "free" and has_trunk(roles.joints)
         self.upright = upright(figure)
@@ -98,6 +107,7 @@ class Run:
         self._slow, self._even, self._free, self._paths = (dict[int, Array]() for _ in range(4))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
         self._held = dict[int, tuple[int, tuple[Array, Array]]]()
+        self._dips = dict[int, list[float]]()  # shares of the motion to a frame at which something overlaps
         self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
@@ -114,10 +124,15 @@ class Run:
             ]
             span, sweeps = self.span, SWEEPS
             while span:
-                self._stages += [(partial(self._swept, omega=omega, span=span), 2 * span) for omega in sweeps]
+                for omega in sweeps:
+                    if span == 1 and omega < LATE:
+                        self._stages.append((partial(self._looked, parts=MENDED[0] // 2), 0))
+                    self._stages.append((partial(self._swept, omega=omega, span=span), 2 * span))
                 span, sweeps = span // 2, FINER
                 if span:
                     self._stages.append((partial(self._between, span=span), 3 * span))
+            for parts in MENDED:
+                self._stages += [(partial(self._looked, parts=parts), 0), (self._mended, 2)]
             holds.begin(self._free)
         self._done = [0] * len(self._stages)  # frames that each stage has passed
 
@@ -163,6 +178,7 @@ class Run:
             self._wanted.pop(frame, None)
             self._chain.pop(frame, None)
             self._held.pop(frame, None)
+            self._dips.pop(frame, None)
         return found
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
@@ -252,10 +268,7 @@ class Run:
         """
         half, last = len(weights) // 2, self._came - 1
         away = np.arange(max(-half, -k // span), (min(half, (last - k) // span) if self.ended else half) + 1)
-        near = weights[away + half]
-        sums = near.sum(), near @ away, near @ away**2  # beside an end the line leans
-        size = sums[0] * sums[2] - sums[1] ** 2
-        near = near * (sums[2] - sums[1] * away) / size if size > 0.0 else near / sums[0]
+        near = leaning(weights[away + half], away)
         return np.asarray(near @ np.array([values[k + span * j] for j in away.tolist()]))
 
     def _alone(self, k: int) -> None:
@@ -281,13 +294,13 @@ class Run:
         shift = pin.XYZQUATToSE3(free[:7]).rotation @ shift if self.figure.root == "free" else shift
         before = np.asarray(pin.integrate(model, self._free[k - span], self._first[k - span])) if k else None
         self.fitter.see(holds.moved(k))
-        q = self._reached(before, reference, span)
+        q = self.fitter.reached(before, reference, span * self.most)
         for _ in range(1 if k else STARTS):
             held = holds.goals(k, self._paths, shift, span=span)
             goals = self._goals(k, reference, CHANGE / dt**0.5 * self.levers, held)
             q = self._settled(q, goals, before)
             if holds.lost(k, q, self.fitter.held(q), held):
-                q = self._settled(self._reached(before, reference, span), goals, before)
+                q = self._settled(self.fitter.reached(before, reference, span * self.most), goals, before)
             holds.touch(k, q, self.fitter.held(q), held)
             holds.landed(k, self.fitter.held(q), held, span)
         self._first[k] = np.asarray(pin.difference(model, free, q))
@@ -301,7 +314,7 @@ class Run:
 
     def _settled(self, q: Array, goals: Goals, before: Array | None) -> Array:
         """The posture (nq,) after the steps of a frame of the first pass."""
-        for _ in range(FIRST if before is None else PASS):
+        for _ in range(FIRST if before is None else FORWARD):
             if before is None:
                 goals = with_values(goals, posture=q)
             following = self.fitter.step(q, goals, most=self._room(q, before, self.span))
@@ -329,8 +342,8 @@ class Run:
             found + 0.5 * abs(k - inside) / span * (found - self._deviation[inside + np.sign(inside - k) * span])
         )
 
-    def _swept(self, k: int, omega: float, span: int) -> None:
-        """Solve a frame anew between those `span` and twice as many frames before and after it."""
+    def _swept(self, k: int, omega: float, span: int, start: Array | None = None) -> None:
+        """Solve a frame anew between those `span` and twice as far away; from `start` in reach of the next too."""
         assert self.holds is not None
         if k % span:
             return
@@ -343,58 +356,45 @@ class Run:
             self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)
         held = self._held[k][1]
         goals = self._goals(k, reference, BEND / (span * self.dt) ** 2 * self.levers, held)
-        before = self._found[k - span] if k else None
-        q = self._reached(before, reference, span)
+        before, after = self._found[k - span] if k else None, None if start is None else self._found.get(k + 1)
+        q = self.fitter.reached(before, reference if start is None else start, span * self.most)
+        midway = self._midway(k) if span == 1 and omega < LATE else []
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
-            q = self.fitter.step(q, goals, most=self._room(q, before, span))
+            q = self.fitter.step(q, goals, most=self._room(q, before, span, after), midway=midway)
         if self.holds.touches:
             self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _room(self, q: Array, before: Array | None, span: int = 1) -> Array | None:
-        """Least and greatest displacement (2, nv) of q that joints reach from the posture before in time."""
+    def _looked(self, k: int, parts: int) -> None:
+        """Note where the motion from the frame before overlaps: all in a few parts, in more where one does nearby."""
+        assert self.holds is not None
+        if not k or self.holds.moved(k) or (parts > MENDED[0] and not any(map(self._dips.get, (k - 1, k, k + 1)))):
+            return
+        known, ends = self._dips.setdefault(k, []), (self._found[k - 1], self._found[k])
+        for share in (number / parts for number in range(1, parts)):
+            if share not in known and self.fitter.overlaps(pin.interpolate(self.model, *ends, share), DIP):
+                known.append(share)
+
+    def _mended(self, k: int) -> None:
+        """Solve a frame again whose motion to one beside it overlaps."""
+        if self._dips.get(k) or self._dips.get(k + 1):
+            self._swept(k, 1.0, 1, self._found[k])
+
+    def _midway(self, k: int) -> list[Midway]:
+        """Where motions to the frames beside one overlap; it gives way by half to the next one, which does the rest."""
+        weight = PASS / self.dt**2
+        found = [Midway(self._found[k - 1], 1.0 - share, 1.0, weight) for share in self._dips.get(k, ())]
+        return found + [Midway(self._found[k + 1], share, 0.5, weight) for share in self._dips.get(k + 1, ())]
+
+    def _room(self, q: Array, before: Array | None, span: int = 1, after: Array | None = None) -> Array | None:
+        """Least and greatest displacement (2, nv) of q that joints reach from the postures before and after in time."""
         if before is None:
             touches = self.holds is not None and self.holds.touches
             return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv))) if touches else None
-        return np.asarray(span * self.reach - pin.difference(self.model, before, q))
-
-    def _reached(self, before: Array | None, q: Array, span: int = 1) -> Array:
-        """The posture nearest to q (nq,) that joints reach from the posture before in time."""
-        q = self.figure.clamp(q)
-        if before is None:
-            return q
-        way = np.asarray(pin.difference(self.model, before, q))
-        most = span * self.most
-        if (np.abs(way) <= most).all():
-            return q
-        return self.figure.clamp(pin.integrate(self.model, before, np.clip(way, -most, most)))
-
-
-def _layout(points: list[str], turns: list[str], roles: Roles, figure: Figure, held: list[HeldPoint]) -> Layout:
-    own, place = roles.places(figure), {role: np.eye(len(points))[k] for k, role in enumerate(points)}
-    for part in ("hip", "shoulder"):
-        if {f"left_{part}", f"right_{part}"} <= place.keys():
-            place[f"{part}s"] = 0.5 * (place[f"left_{part}"] + place[f"right_{part}"])
-    trunk = [
-        ("left_hip", "right_hip"),
-        ("hips", "shoulders"),
-        ("left_shoulder", "right_shoulder"),
-        ("shoulders", "head"),
-    ]
-    limbs = [ends for limb in LIMBS for side in ("left", "right") for ends in known_bones(limb, side, points)]
-    pairs = [ends for ends in trunk + limbs if set(ends) <= place.keys()]
-    rows = [place[end] - place[start] for start, end in pairs]
-    weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
-    if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
-        rows.append(place["hips"])
-        weights.append(ANCHOR)
-    else:  # what is known says where it is
-        rows += [place[role] for role in points]
-        weights += [1.0] * len(points)
-    return Layout(
-        [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
-        np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
-        [(point.joint, point.place, point.base) for point in held],
-    )  # fmt: skip
+        room = np.asarray(span * self.reach - pin.difference(self.model, before, q))
+        if after is not None:
+            other = self.reach - pin.difference(self.model, after, q)
+            room = np.stack([np.maximum(room[0], other[0]), np.minimum(room[1], other[1])])
+        return room

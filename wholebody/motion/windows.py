@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 
 
 class Window(NamedTuple):
@@ -48,3 +48,10 @@ def normal(time: float, dt: float) -> Array:
     half = max(1, int(np.ceil(3.0 * time / dt)))
     weights = np.exp(-0.5 * (np.arange(-half, half + 1) * dt / time) ** 2)
     return np.asarray(weights / weights.sum())
+
+
+def leaning(near: Array, away: Indices) -> Array:
+    """Weights (k,) by which values `away` from a place give that of the line nearest to them there; a mean inside."""
+    sums = near.sum(), near @ away, near @ away**2  # beside an end the line leans
+    size = sums[0] * sums[2] - sums[1] ** 2
+    return np.asarray(near * (sums[2] - sums[1] * away) / size if size > 0.0 else near / sums[0])

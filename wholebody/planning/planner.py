@@ -17,6 +17,7 @@ import pinocchio as pin
 from wholebody.assessment.posture import assess
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
+from wholebody.base.compiled import compile_all, compile_seconds
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
@@ -41,6 +42,17 @@ ENDS = 8  # postures that meet goals; more = ends that are reached more easily, 
 NEARER = 0.95  # of the length of the best motion: what others are shorter than
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
 AGAIN = 0.35  # of the time limit: for shorter paths; more = shorter, later
+NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
+    "wholebody.terms.linearisation",
+    "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.step_program",
+    "wholebody.methods.qp.subproblem",
+    "wholebody.methods.qp.plain_chain",
+    "wholebody.geometry.proximity",
+    "wholebody.geometry.contact_rows",
+    "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.geometry.continuous.swept_depth",
+)
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
@@ -57,7 +69,7 @@ class Plan:
         violation: largest by which a frame misses limits, constraints and clearances, metres and radians.
         velocity: largest of any joint, in parts of its limit.
         acceleration: the same.
-        seconds: of the processor.
+        seconds: of the processor, without compiling.
 
     Examples:
         >>> found = wb.plan(scene, standing, human.with_joints(standing, {"left_elbow_flexion": 1.0}))
@@ -102,8 +114,8 @@ def plan(
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
-        time_limit: seconds of the processor that all of it may take, the judgement too; at least 0.1. Free roots are
-            looked for within a metre of the way between the ends.
+        time_limit: seconds of the processor that all but compiling may take, the judgement too; at least 0.1. Free
+            roots are looked for within a metre of the way between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
@@ -115,7 +127,8 @@ def plan(
         >>> wb.plan(wb.Scene(hand), "open", "grip").solved
         True
     """
-    began = processor_time()
+    compile_all(NEEDED)
+    began = _computed()
     checks.instance(scene, Scene, "plan: scene", "make one with wb.Scene(figure)")
     pace = Pace() if pace is None else checks.instance(pace, Pace, "plan: pace", "give wb.planning.Pace(velocity=1.0)")
     limit = checks.number(time_limit, "plan: time_limit", 0.0, np.inf, "s")
@@ -140,7 +153,12 @@ def plan(
                 found = _smoothed(judge, local, path)
     if found is None:
         found = Plan(Clip(scene.figure, problem.start[None], pace.dt, "plan"), False, message)
-    return replace(found, message=message if found.solved else found.message, seconds=processor_time() - began)
+    return replace(found, message=message if found.solved else found.message, seconds=_computed() - began)
+
+
+def _computed() -> float:
+    """Processor's time of this process without compiling, seconds."""
+    return processor_time() - compile_seconds()
 
 
 def _goals(goal: Any) -> tuple[Goal, ...]:
@@ -322,9 +340,9 @@ class _Judge:
 
     def __init__(self, problem: Problem, pace: Pace) -> None:
         self.problem, self._pace = problem, pace
-        began = processor_time()
+        began = _computed()
         assess(problem, problem.start)
-        self._frame = 2.0 * (processor_time() - began)  # s: each is also swept from the one before
+        self._frame = 2.0 * (_computed() - began)  # s: each is also swept from the one before
 
     def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""

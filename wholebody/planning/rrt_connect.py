@@ -53,7 +53,7 @@ class Tree:
 class RRTConnect:
     """A tree from the start and one from the ends, which `local` lets grow, and `slides` where that is blocked at once.
 
-    So branches go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008).
+    So branches towards samples go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008).
 
     Attributes:
         samples: how many they were extended towards.
@@ -82,21 +82,22 @@ class RRTConnect:
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)
         there = 1 - here
-        number, _ = self._extend(self._trees[here], sample)
+        number, _ = self._extend(self._trees[here], sample, self._slides)
         if number is None:
             return None
-        other, met = self._extend(self._trees[there], self._trees[here].postures[number])
+        # steps towards what is behind a thing end at it, and cost as much as ten geodesics
+        other, met = self._extend(self._trees[there], self._trees[here].postures[number], None)
         if not met or other is None:
             return None
         branches = {here: self._trees[here].path(number), there: self._trees[there].path(other)}
         return [*branches[0], *branches[1][-2::-1]]
 
-    def _extend(self, tree: Tree, target: Array) -> tuple[int | None, bool]:
+    def _extend(self, tree: Tree, target: Array, slides: TrackedMotions | None) -> tuple[int | None, bool]:
         """Add the motion from the nearest posture towards a target; the last of it, and whether it is there."""
         number = tree.nearest(target)
         way, met = self._local.towards(tree.postures[number], target)
-        if not (way or met) and self._slides is not None:
-            way, met = self._slides.towards(tree.postures[number], target, SLID)
+        if not (way or met) and slides is not None:
+            way, met = slides.towards(tree.postures[number], target, SLID)
         for q in way:
             number = tree.add(q, number)
         return (number if way or met else None), met

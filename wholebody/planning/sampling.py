@@ -61,14 +61,15 @@ class Sampler:
         """A posture (nq,) whose joints are a share of the way from q (nq,) to a random posture.
 
         A free root is within `ROOM` of that of q. Where nothing is held it is a random share of that away, as narrow
-        places are small, and in half of the postures it turns about the vertical.
+        places are small, and in half of the postures it turns, about the vertical or about any axis.
         """
         model, rng = self._figure.model, self._rng
         away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self.anywhere(), q)))
         for joint in self._roots:
             here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
             turns = not self._held and rng.uniform() < 0.5
-            turn = pin.exp3(np.array((0.0, 0.0, rng.uniform(-np.pi, np.pi)))) if turns else np.eye(3)
+            axis = np.array((0.0, 0.0, 1.0)) if rng.uniform() < 0.5 else rng.normal(size=3)
+            turn = pin.exp3(rng.uniform(-np.pi, np.pi) * axis / np.linalg.norm(axis)) if turns else np.eye(3)
             far = spread if self._held else 10.0 ** rng.uniform(-1.0, 0.0)
             moved = far * rng.uniform(-ROOM, ROOM, 3)
             there = pin.SE3(turn @ here.rotation, here.translation + moved)

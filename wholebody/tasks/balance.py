@@ -41,10 +41,9 @@ NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 class _Soles(NamedTuple):
     """Points of the pieces of feet, and of what is beyond them, in the axes of their joints."""
 
-    joints: list[int]
-    points: Array  # (n, 3) swept points; of an ellipsoid its middle
+    joints: Indices  # (n,) that carry the points
+    points: Array  # (n, 4) swept points, and 1; of an ellipsoid its middle
     radii: Array  # (n,) around them
-    carrier: Indices  # (n,) place in `joints`
     begin: Indices  # (feet,) first point of each foot
     foot: Indices  # (n,) which foot a point is of
     ellipsoids: list[tuple[int, Any, pin.SE3]]  # place of the point, shape, and where it is
@@ -60,21 +59,17 @@ def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tupl
     joints = tuple([inputs.find_place(scene, foot, "Balance").joint for foot in feet])
     soles = inputs.once(scene, ("soles", joints), partial(_soles_of, scene, feet, joints))
     with scene.figure.posed(q) as state:
-        placed = {joint: state.data.oMi[joint].copy() for joint in soles.joints}
-    places = np.array([placed[joint].homogeneous for joint in soles.joints])[soles.carrier]
-    points = np.einsum("nij,nj->ni", places[:, :3, :3], soles.points)
-    points += places[:, :3, 3]
-    points[:, 2] -= soles.radii
-    for number, shape, local in soles.ellipsoids:
-        points[number] = outermost(shape, placed[soles.joints[soles.carrier[number]]] * local, DOWN)[0]
+        points = np.einsum("nj,njk->nk", soles.points, state.joints[soles.joints])
+        points[:, 2] -= soles.radii
+        for number, shape, local in soles.ellipsoids:
+            points[number] = outermost(shape, state.data.oMi[int(soles.joints[number])] * local, DOWN)[0]
     height = points[:, 2]
     low = height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT
-    return points[low], np.array(soles.joints, dtype=np.intp)[soles.carrier[low]]
+    return points[low], soles.joints[low]
 
 
 def _soles_of(scene: Surroundings, feet: Sequence[str], bearing: Sequence[int]) -> _Soles:
-    joints: dict[int, int] = {}
-    points, radii, carrier, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
+    points, radii, joints, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
     ellipsoids: list[tuple[int, Any, pin.SE3]] = []
     for number, (name, joint) in enumerate(zip(feet, bearing, strict=True)):
         begin.append(len(radii))
@@ -86,14 +81,14 @@ def _soles_of(scene: Surroundings, feet: Sequence[str], bearing: Sequence[int]) 
                 if not len(swept.points):
                     ellipsoids.append((len(radii), piece.geometry, pin.SE3(local)))
                 own = swept.points if len(swept.points) else np.zeros((1, 3))
-                points.append(own @ local.rotation.T + local.translation)
+                points.append(np.insert(own @ local.rotation.T + local.translation, 3, 1.0, axis=1))
                 radii += [swept.radius] * len(own)
-                carrier += [joints.setdefault(int(piece.parentJoint), len(joints))] * len(own)
+                joints += [int(piece.parentJoint)] * len(own)
         foot += [number] * (len(radii) - begin[-1])
         if len(radii) == begin[-1]:
             raise InputError(f"Balance: {name!r} has no pieces to stand on; name segments with geometry as feet")
-    at, first, of = (np.array(each, dtype=np.intp) for each in (carrier, begin, foot))
-    return _Soles([*joints], np.concatenate(points), np.array(radii), at, first, of, ellipsoids)
+    carriers, first, of = (np.array(each, dtype=np.intp) for each in (joints, begin, foot))
+    return _Soles(carriers, np.concatenate(points), np.array(radii), first, of, ellipsoids)
 
 
 class Polygon(NamedTuple):
@@ -196,8 +191,9 @@ class SolePolygon(NamedTuple):
 
     def _placed(self, state: State) -> Array:
         """The points (m, 3) in the world."""
-        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
-        return np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
+        placed = state.joints[self.joints]
+        points: Array = np.einsum("nj,njk->nk", self.points, placed[:, :3]) + placed[:, 3]
+        return points
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""

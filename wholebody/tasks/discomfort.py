@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
+from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
@@ -59,20 +61,7 @@ class Discomfort(Measure):
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
         """Read the limits, the neutral posture and the weights of the figure."""
-        figure = scene.figure
-        limits = figure.limits
-        moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)
-        idx_q, idx_v = limits.idx_q[moves], limits.idx_v[moves]
-        ends = np.array([limits.upper[moves], limits.lower[moves]])
-        span = ends[0] - ends[1]
-        weights = figure.effort_weights[idx_v]
-        greatest = np.ones(len(weights))
-        for joints in figure.bodies.values():  # each figure's weights over the greatest of its own
-            mine = np.isin(idx_v, [figure.model.joints[k].idx_v for k in joints])
-            greatest[mine] = max(float(weights[mine].max(initial=0.0)), LEAST_CURVATURE)
-        weights = weights / (greatest * span * span)
-        phase = STEEPNESS * np.array([-1.0 / span, 1.0 / span])
-        return filled(self, limited=LimitedJoints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase))
+        return filled(self, limited=inputs.once(scene, Discomfort, partial(_limited, scene.figure)))
 
     def value(self, state: State) -> float:
         """The discomfort."""
@@ -105,3 +94,20 @@ class Discomfort(Measure):
         """(2, n) 2.5 r to the upper and lower limits, kept between zero at one limit and 2.5 at the other."""
         joints = self.limited
         return np.asarray(np.minimum(np.maximum((q - joints.limits) * joints.phase, 0.0), STEEPNESS))
+
+
+def _limited(figure: Figure) -> LimitedJoints:
+    """The joints of a figure that have two limits."""
+    limits = figure.limits
+    moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)
+    idx_q, idx_v = limits.idx_q[moves], limits.idx_v[moves]
+    ends = np.array([limits.upper[moves], limits.lower[moves]])
+    span = ends[0] - ends[1]
+    weights = figure.effort_weights[idx_v]
+    greatest = np.ones(len(weights))
+    for joints in figure.bodies.values():  # each figure's weights over the greatest of its own
+        mine = np.isin(idx_v, [figure.model.joints[k].idx_v for k in joints])
+        greatest[mine] = max(float(weights[mine].max(initial=0.0)), LEAST_CURVATURE)
+    weights = weights / (greatest * span * span)
+    phase = STEEPNESS * np.array([-1.0 / span, 1.0 / span])
+    return LimitedJoints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase)

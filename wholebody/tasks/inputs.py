@@ -80,10 +80,14 @@ def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Indices:
         raise InputError(f"{where}: {error}") from None
 
 
-def angular_dofs(model: Any) -> Mask:
+def angular_dofs(scene: Surroundings) -> Mask:
     """(nv,) whether each degree of freedom is in radians, which holds for rotations."""
-    state = State(model)
-    return np.asarray(state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5)
+
+    def found() -> Mask:
+        state = State(scene.model)
+        return np.asarray(state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5)
+
+    return once(scene, "angular", found)
 
 
 def point(value: object, where: str) -> Array:

@@ -58,7 +58,7 @@ class Posture(Goal):
         """Look up the posture and the joints."""
         model = scene.model
         dofs = np.arange(model.nv) if self.joints is None else inputs.find_dofs(scene, self.joints, "Posture")
-        return filled(self, resolved_target=self._find(scene), dofs=dofs, _angular=inputs.angular_dofs(model)[dofs])
+        return filled(self, resolved_target=self._find(scene), dofs=dofs, _angular=inputs.angular_dofs(scene)[dofs])
 
     @property
     def angular(self) -> Mask:

@@ -54,13 +54,13 @@ class PotentialEnergy(Measure):
         for joint in scene.figure.roots.values():
             root = model.joints[joint]
             neutral[root.idx_q : root.idx_q + root.nq] = start[root.idx_q : root.idx_q + root.nq]
-        state = State(model).update(neutral)
         joints = np.array([k for k in range(1, model.njoints) if model.inertias[k].mass > 0.0], dtype=np.intp)
         centres = tuple(np.array(model.inertias[int(k)].lever) for k in joints)
         # standard acceleration of gravity [m/s^2] (CGPM 1901).
         weights = np.array([(model.inertias[int(k)].mass * 9.80665) ** 2 for k in joints])
-        heights = _centres(state, joints, centres)[:, 2]
-        return filled(self, masses=Masses(joints, centres, weights, heights, state.support[joints]))
+        with scene.figure.posed(neutral) as state:
+            heights, support = _centres(state, joints, centres)[:, 2], state.support[joints]
+        return filled(self, masses=Masses(joints, centres, weights, heights, support))
 
     def value(self, state: State) -> float:
         """The measure [J^2]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from typing import NamedTuple
 
 import coal
@@ -16,7 +17,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_on, surface
+from wholebody.tasks.surfaces import Surface, face, joined, once_beside, outermost, segments_on, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
@@ -65,11 +66,14 @@ class Sit(ContactTerm):
 
     def resolve(self, scene: Surroundings, start: Array) -> Sit:
         """Find the surfaces and the seat's face."""
-        with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:
-            return self._between(scene, state, rest)
+        where, things = f"Sit({shown(self.on)})", [self.on, *filter(None, [self.back])]
+        key = Sit, self.on, self.back, self.pelvis, self.trunk, self.erect
+        parts, touches = once_beside(scene, things, where, start, key, partial(self._between, scene, where))
+        return filled(self, parts=parts, touches=touches)
 
-    def _between(self, scene: Surroundings, state: State, rest: State) -> Sit:
-        where = f"Sit({shown(self.on)})"
+    def _between(
+        self, scene: Surroundings, where: str, state: State, rest: State
+    ) -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
         seat = face(scene, self.on, UP, state, where)
         thighs = inputs.once(scene, ("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
@@ -102,7 +106,7 @@ class Sit(ContactTerm):
         if self.erect:
             ahead = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 0]
             parts += [Level(place, ahead, seat), self._measured(scene, place, where)]
-        return filled(self, parts=tuple(parts), touches=touches)
+        return tuple(parts), touches
 
     def _measured(self, scene: Surroundings, place: inputs.Place, where: str) -> AtAngles:
         """Hips, spine and neck as in the posture of people who are measured: sitting, with parallel thighs."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -15,12 +16,21 @@ from wholebody.base.fields import Names
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import FAR_INSIDE, STANDING_HEIGHT, STEADY, Feet, Margin, SolePolygon, polygon
+from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, SolePolygon, polygon
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP
-from wholebody.tasks.surfaces import Surface, face, joined, outermost, segments_beyond, segments_on, surface
+from wholebody.tasks.surfaces import (
+    Surface,
+    face,
+    joined,
+    once_beside,
+    outermost,
+    segments_beyond,
+    segments_on,
+    surface,
+)
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
@@ -62,17 +72,29 @@ class Stand(TermOfParts):
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
-        with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:
-            return self._between(scene, state, rest)
-
-    def _between(self, scene: Surroundings, state: State, rest: State) -> Stand:
         where = f"Stand({shown(self.on)})"
         if stray := [str(knee) for knee in self.knees if knee not in self.feet]:
             example = "feet=['left_foot', 'right_shank'], knees=['right_shank']"
             raise InputError(f"{where}: knees are of the feet, and {some(stray)} is not; give {example}")
+        for foot in self.feet:
+            inputs.find_place(scene, foot, where)
+        key = Stand, self.on, tuple(self.feet), tuple(self.knees), self.balance
+        make = partial(self._between, scene, where)
+        parts, touches = once_beside(scene, [self.on], where, start, key, make)
+        keeps, soles = 0.0, parts[-1]
+        if isinstance(soles, SolePolygon):
+            with scene.figure.posed(start) as state:
+                corners = soles.corners(state)
+            if not len(corners):
+                raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
+            keeps = STEADY * polygon(corners).width if self.margin is None else self.margin
+        return filled(self, parts=parts, touches=touches, keeps=keeps)
+
+    def _between(
+        self, scene: Surroundings, where: str, state: State, rest: State
+    ) -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
-        keeps = 0.0
         touches: tuple[tuple[str, str], ...] = ()
         corners, joints = [], []
         for foot in self.feet:
@@ -104,12 +126,8 @@ class Stand(TermOfParts):
                 joints += each[1]
         if self.balance:
             mass = inputs.joints_with_mass(scene, where, self.feet)
-            soles = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass)
-            if not (soles.rows(state)[0] < FAR_INSIDE).any():
-                raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
-            parts.append(soles)
-            keeps = STEADY * polygon(soles.corners(state)).width if self.margin is None else self.margin
-        return filled(self, parts=tuple(parts), touches=touches, keeps=keeps)
+            parts.append(SolePolygon(np.array(corners), np.array(joints, dtype=np.intp), mass))
+        return tuple(parts), touches
 
     @property
     def lower(self) -> Array:

@@ -6,8 +6,8 @@ are asked for, so a thing that is moved after a term was resolved is found where
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import coal
 import numpy as np
@@ -22,6 +22,8 @@ from wholebody.geometry.pieces import SweptPoints, swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings
 from wholebody.tasks.inputs import once
+
+_T = TypeVar("_T")
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
@@ -105,6 +107,23 @@ def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
     pieces = scene.geometry.geometryObjects
     owned = [k for k, owner in enumerate(scene.piece_owner) if owner in segments and pieces[k].parentJoint == joint]
     return _of_pieces(scene, name, owned)
+
+
+def once_beside(
+    scene: Surroundings, things: Iterable[str], where: str, start: Array, key: Hashable,
+    make: Callable[[State, State], _T],
+) -> _T:  # fmt: skip
+    """What `make` makes of the start (nq,) and the neutral posture; once, where the figure carries none of some things.
+
+    Then they stand the same at every start.
+    """
+
+    def made() -> _T:
+        with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:
+            return make(state, rest)
+
+    carried = any(joint for thing in things for joint in surface(scene, thing, where).joints)
+    return made() if carried else once(scene, key, made)
 
 
 def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Surface:

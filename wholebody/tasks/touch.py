@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -62,6 +63,11 @@ class Touch(ContactTerm):
 
     def resolve(self, scene: Surroundings, start: Array) -> Touch:
         """Find the two surfaces."""
+        key = Touch, self.part, self.thing
+        parts, touches = inputs.once(scene, key, partial(self._between, scene))
+        return filled(self, parts=parts, touches=touches)
+
+    def _between(self, scene: Surroundings) -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
         where = f"Touch({shown(self.part)}, {shown(self.thing)})"
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
@@ -70,11 +76,7 @@ class Touch(ContactTerm):
         parts: tuple[Part, ...] = (Gap(first, second, own=own_surface(scene, first)),)
         if second.fixed is not None:
             parts = _meeting(scene, first, second, where)
-        return filled(
-            self,
-            parts=parts,
-            touches=owner_pairs(touched(scene, first), touched(scene, second)),
-        )
+        return parts, owner_pairs(touched(scene, first), touched(scene, second))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.attack.judging import Case, Verdict
-from wholebody.bench.rows import read_rows
 from wholebody.cli.bench import run as group
 
 
@@ -28,13 +28,13 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     (docs / "where-methods-fail.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
     words = ("--cases", "12", "--kinds", "file", "--seed", "2", "--seconds", "900", "--out", str(out))
     code = bench(*words, "--update-docs", str(docs))
-    _, rows = read_rows(out / "attack.csv")
+    rows = csv_rows(out / "attack.csv")
     wrong = [row for row in rows if row["outcome"] == "wrong"]
     assert len(rows) == 12
-    assert {row.tool for row in rows} == {"file"}
+    assert {row["tool"] for row in rows} == {"file"}
     assert code == int(bool(wrong))
     for row in wrong:
-        assert (out / row.case / "repeat.py").is_file()
+        assert (out / row["case"] / "repeat.py").is_file()
     page = (docs / "where-methods-fail.md").read_text()
     assert "\nold\n" not in page
     assert "mutated tasks" in page
@@ -48,8 +48,8 @@ def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
     assert bench("--out", str(tmp_path)) == 130
-    _, rows = read_rows(tmp_path / "attack.csv")
-    assert [row["number"] for row in rows] == [0, 1]
+    rows = csv_rows(tmp_path / "attack.csv")
+    assert [row["number"] for row in rows] == ["0", "1"]
 
 
 def test_what_cannot_be_asked_is_refused() -> None:

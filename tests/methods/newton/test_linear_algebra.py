@@ -9,7 +9,6 @@ from wholebody.methods.newton.linear_algebra import (
     Gram,
     LinearSystem,
     Pattern,
-    QuasiDefinite,
     dense_columns,
     linear_algebra,
 )
@@ -90,31 +89,6 @@ def test_a_hub_costs_less_when_its_columns_are_split_off() -> None:
     filled.solve(system)
     assert filled.fill == 400 * 401 // 2
     assert split.fill < 0.5 * filled.fill
-
-
-def test_second_derivatives_enter_the_kkt_matrix() -> None:
-    rng = np.random.default_rng(4)
-    pattern = _pattern(rng, 8, 12)
-    rows = np.array([3, 3, 5, 7, 7])
-    columns = np.array([1, 1, 5, 2, 7])
-    values = np.array([0.2, 0.1, 0.4, -0.2, 0.3])
-    system = _system(rng, pattern)
-    solver = QuasiDefinite(pattern, (rows, columns))
-    step, _ = solver.solve(system, values)
-    hessian = np.diag(system.weight)
-    for row, column, value in zip(rows, columns, values, strict=True):
-        hessian[row, column] += value
-        if row != column:
-            hessian[column, row] += value
-    jacobian = jacobian_of(pattern, system.values)
-    matrix = np.block([[hessian, -jacobian.T], [-jacobian, -np.diag(system.damping)]])
-    wanted = np.linalg.solve(matrix, np.concatenate([-system.gradient, system.residual]))
-    assert step == pytest.approx(wanted[:12], abs=1e-6)
-    assert solver.convex()
-    solver.solve(system, np.array([0.0, 0.0, -50.0, 0.0, -50.0]))
-    jacobian_null = np.linalg.svd(jacobian)[2][8:]
-    bent = jacobian_null @ (np.diag(system.weight) - np.diag(50.0 * np.isin(np.arange(12), (5, 7)))) @ jacobian_null.T
-    assert solver.convex() == bool(np.linalg.eigvalsh(bent).min() > 0.0)
 
 
 def test_conflicting_rows_are_met_in_the_least_squares_sense() -> None:

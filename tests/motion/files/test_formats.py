@@ -120,16 +120,11 @@ PROFILE = ["# comment", "0.1", "2", "\t".join(["0"] * 55), "\t".join(["0"] * 55)
     ("line", "text", "sentence"),
     [
         (1, "0", r"line 2: the time step is 0 s"),
-        (1, "-1", r"line 2: the time step is -1 s"),
         (1, "nan", r"line 2: nan is not finite"),
-        (1, "0.1 0.2", r"line 2: '0.1 0.2' is no number"),
         (2, "3", r"line 5: 2 rows and not 3"),
-        (2, "1", r"line 5: 2 rows and not 1"),
         (2, "two", r"line 3: 'two' is no number of frames"),
-        (2, "1e9", r"line 3: '1e9' is no number of frames"),
         (3, "0\t1", r"line 4: 2 values and not 55"),
         (4, "\t".join(["0"] * 54 + ["nan"]), r"line 5: value 55 is nan"),
-        (4, "\t".join(["0"] * 54 + ["x"]), r"line 5: 'x' is no number"),
     ],
 )
 def test_a_wrong_joint_profile_names_its_line(
@@ -354,18 +349,13 @@ def test_up_and_units_are_recognised_or_said(tmp_path: Path) -> None:
         ("HIERARCHY", "hello", r"line 1: is no BVH file"),
         ("  JOINT spine", "}\nROOT other\n{\n  JOINT spine", r"line \d+: a second root, 'other'"),
         ("Frames: 2", "Frames: 3", r"line 30: 2 frames and not 3; the file is cut off"),
-        ("Frames: 2", "Frames: 1", r"line 30: 2 frames and not 1; the file is longer"),
         ("Frames: 2", "Frames: x", r"line 27: 'x' is no number of frames"),
         ("Frame Time: 0.05", "Frame Time: 0", r"line 28: the time step is 0 s"),
-        ("Frame Time: 0.05", "", r"line 29: '30 1 2 .*' stands where Frame Time: is due"),
-        ("31 1 3", "31 1", r"line 30: 16 values and not 17"),
         ("31 1 3", "31 1 nan", r"line 30: value 3 is nan"),
         ("31 1 3", "31 1 a", r"line 30: 'a' is no number"),
         ("OFFSET 10 0 0", "OFFSET 10 0", r"line 8: an OFFSET has three numbers"),
-        ("OFFSET 10 0 0", "OFFSET inf 0 0", r"line 8: inf is not finite"),
         ("CHANNELS 2", "CHANNELS 3", r"line 13: CHANNELS are a count and as many names"),
         ("MOTION", "}\nMOTION", r"line 26: a brace that closes nothing"),
-        ("MOTION", "", r"line \d+: "),
     ],
 )
 def test_a_wrong_bvh_names_its_line(old: str, new: str, sentence: str, human: Figure, tmp_path: Path) -> None:

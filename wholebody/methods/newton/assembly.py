@@ -33,7 +33,7 @@ from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.settings import CONTACTS, FRAMES
-from wholebody.methods.newton.system import System, unit
+from wholebody.methods.newton.system import System
 from wholebody.scene.moving_obstacles import FrameMotion
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Measure
@@ -210,7 +210,7 @@ class Assembly(AssemblyJoints):
             algebra: "auto", "normal", "kkt" or "schur".
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
-                little; without inequalities, shapes, figures and measures only.
+                little; without figures and measures only.
         """
         tolerance = _tolerance(tolerance)
         iterations = int(ITERATIONS(iterations, "iterations"))
@@ -220,17 +220,14 @@ class Assembly(AssemblyJoints):
         with self._alone:
             active = self._ready(algebra)
             start = active.begin(self.variables(), self._goal_batches())
-            if nearest and (active.contacts is not None or active.system.inequality.any() or self._measures):
-                raise InputError(
-                    "nearest is for assemblies without limits, one-sided planes, shapes and measures; leave it out"
-                )
+            if nearest and (self._figures or self._measures):
+                raise InputError("nearest is for assemblies without figures and measures; leave it out")
             found = satisfy(
                 active, start, tolerance=tolerance, iterations=iterations, kind=inequalities, thorough=True,
             )  # fmt: skip
-            x, nearness = found.x, tuple[float, ...]()
-            if nearest and found.met:  # redundant equations leave an error of the KKT system of 1e-10
-                settled = active.nearest(x, start, max(tolerance, 1e-9), iterations)
-                x, nearness = (unit(settled.x) if settled.met else x), settled.errors
+            x = found.x
+            if nearest and found.met:
+                x = active.nearest(x, start, tolerance, iterations)
             elif found.met:
                 x = active.lowered(x, tolerance)
             self._places = list(x.reshape(-1, 7))
@@ -246,7 +243,6 @@ class Assembly(AssemblyJoints):
                 residuals=found.residuals,
                 systems=found.systems,
                 algebra=active.algebra.name,
-                nearness=nearness,
                 penetration=max(0.0, -least),
                 least_distance=least,
                 path=np.array([self._to_scene(state) for state in path]),

@@ -33,8 +33,6 @@ class AssemblySolution:
         residuals: largest error before each iteration and at the end.
         systems: linear systems solved.
         algebra: name of the factorisation.
-        nearness: largest error of the KKT system before each iteration of `nearest` and at the end; empty
-            without it. If the last is above the tolerance, the placements are near the start, but not the nearest.
         penetration: depth of the deepest overlap of the tested pairs at the end, metres; judged by coal for all pairs
             at once. 0 without shapes.
         least_distance: of the tested pairs, metres; inf without shapes.
@@ -57,7 +55,6 @@ class AssemblySolution:
     residuals: tuple[float, ...]
     systems: int
     algebra: str
-    nearness: tuple[float, ...]
     penetration: float
     least_distance: float
     path: Array

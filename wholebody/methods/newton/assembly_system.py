@@ -14,12 +14,10 @@ from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.batches import Batch
-from wholebody.methods.newton.feasibility import Projection, kkt_algebra, project
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.linear_algebra import QuasiDefinite
 from wholebody.methods.newton.measures import Objective, refine
 from wholebody.methods.newton.settings import REFINEMENT
-from wholebody.methods.newton.system import ActiveSystem, System, unit
+from wholebody.methods.newton.system import ActiveSystem, unit
 from wholebody.scene.scene import Scene
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Measure
@@ -43,7 +41,6 @@ class AssemblySystem(ActiveSystem):
         super().__init__([*held, *(() if objective is None else objective.batches())], weight, algebra, figures)
         self._to_scene, self.revision, self.objective = to_scene, revision, objective
         self.own_terms = objective is not None
-        self._nearest: tuple[System, QuasiDefinite] | None = None
 
     def among(self, scene: Scene, clearance: float) -> None:
         """Let the pairs of a scene of the bodies touch, at a distance of at least `clearance` metres."""
@@ -74,11 +71,13 @@ class AssemblySystem(ActiveSystem):
 
         return refine(self, x, value, tolerance=tolerance, rounds=rounds)[0]
 
-    def nearest(self, x: Array, anchor: Array, tolerance: float, iterations: int) -> Projection:
-        """The place nearest to the anchor from x (both (7 n,)); analysed once while the pattern stays."""
-        if self._nearest is None or self._nearest[0] is not self.system:
-            self._nearest = self.system, kkt_algebra(self.system)
-        return project(self.system, self._nearest[1], x, anchor, tolerance=tolerance, iterations=iterations)
+    def nearest(self, x: Array, anchor: Array, tolerance: float, iterations: int) -> Array:
+        """The place (7 n,) nearest to the anchor, from x, where the equations hold, in so many rounds (eq. 1)."""
+
+        def value(here: Array) -> float:
+            return float(0.5 * (self._weight * (here - anchor)) @ (here - anchor))
+
+        return refine(self, x, value, tolerance=tolerance, rounds=iterations, anchor=anchor)[0]
 
     def _projected(self, x: Array) -> Array:
         x = unit(x)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.errors import InputError
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.quaternions import relative_forms
 
@@ -93,10 +92,6 @@ class Batch(ABC):
     def jacobian(self, x: Array) -> Array:
         """(k, size, 7 b) derivative of the residual."""
 
-    def curvature(self, x: Array, force: Array) -> Array:
-        """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual."""
-        raise InputError(f"{self.labels[0]}: it has no second derivatives; leave the nearest place out")
-
 
 class Unit(Batch):
     """Euler parameters of unit length, of all bodies with some names: (e.e - 1) / 2 = 0."""
@@ -115,11 +110,6 @@ class Unit(Batch):
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         result = np.zeros((len(self), 1, 7))
         result[:, 0, TURN] = x[self.bodies[:, 0], 3:]
-        return result
-
-    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        result = np.zeros((len(self), 7, 7))
-        result[:, TURN, TURN] = force[:, :, None] * np.eye(4)
         return result
 
 
@@ -164,13 +154,6 @@ class Coincide(Batch):
         result[..., 3:] = self._shared(x)[1]
         return result.reshape(len(self), self.size, 14)
 
-    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        result = np.zeros((len(self), 14, 14))
-        forms = np.einsum("ki,kisab->ksab", force, self._forms)
-        result[:, TURN, TURN] = forms[:, 0]
-        result[:, OTHER_TURN, OTHER_TURN] = forms[:, 1]
-        return result
-
 
 class Turn(Batch):
     """Axes fixed to two bodies agree: rows of 2 conj(e1 f1) (e2 f2), which is bilinear.
@@ -201,13 +184,6 @@ class Turn(Batch):
         result = np.zeros((len(self), self.size, 14))
         result[:, :, TURN] = self._shared(x)[0]
         result[:, :, OTHER_TURN] = np.einsum("ka,kiab->kib", x[self.bodies[:, 0], 3:], self.forms)
-        return result
-
-    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        result = np.zeros((len(self), 14, 14))
-        mixed = np.einsum("ki,kiab->kab", force, self.forms)
-        result[:, TURN, OTHER_TURN] = mixed
-        result[:, OTHER_TURN, TURN] = mixed.transpose(0, 2, 1)
         return result
 
 
@@ -248,22 +224,6 @@ class Slide(Batch):
         result[:, :, OTHER_TURN] = normals @ quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.points)
         return result
 
-    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        _, normals, way = self._parts(x)
-        first = np.einsum("ki,kij->kj", force, self.normals)
-        push = np.einsum("ki,kij->kj", force, normals)
-        change = quat.rotate_derivative(x[self.bodies[:, 0], 3:], first)  # (k, 3, 4)
-        other = quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.points)
-        result = np.zeros((len(self), 14, 14))
-        result[:, TURN, TURN] = 2.0 * quat.rotate_form(first, way)
-        result[:, OTHER_TURN, OTHER_TURN] = 2.0 * quat.rotate_form(self.points, push)
-        result[:, OTHER_PLACE, TURN] = change
-        result[:, PLACE, TURN] = -change
-        result[:, OTHER_TURN, TURN] = other.transpose(0, 2, 1) @ change
-        for block in (PLACE, OTHER_PLACE, OTHER_TURN):
-            result[:, TURN, block] = result[:, block, TURN].transpose(0, 2, 1)
-        return result
-
 
 class Angle(Batch):
     """Angle of a revolute joint about z of its axes: sign (2 atan2(z, w) of conj(e1 f1) (e2 f2) - bound).
@@ -298,31 +258,13 @@ class Angle(Batch):
         result: Array = (self.sign * (self.angle(x) - self.bound))[:, None]
         return result
 
-    def _gradients(self, x: Array) -> tuple[Array, Array, Array]:
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
         part, right, left = self._shared(x)
         gradient = np.zeros((len(self), 2, 14))
         gradient[:, :, TURN], gradient[:, :, OTHER_TURN] = right, left
         square = np.maximum((part * part).sum(axis=1), 1e-12)
-        return part, gradient, square
-
-    def jacobian(self, x: Array) -> Array:  # noqa: D102
-        part, gradient, square = self._gradients(x)
         row = part[:, 1:] * gradient[:, 0] - part[:, :1] * gradient[:, 1]
         result: Array = (2.0 * self.sign / square)[:, None, None] * row[:, None, :]
-        return result
-
-    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        part, gradient, square = self._gradients(x)
-        mixed = part[:, 1, None, None] * self.forms[:, 0] - part[:, 0, None, None] * self.forms[:, 1]
-        second = np.zeros((len(self), 14, 14))
-        second[:, TURN, OTHER_TURN] = mixed
-        second[:, OTHER_TURN, TURN] = mixed.transpose(0, 2, 1)
-        s, c = gradient[:, 0], gradient[:, 1]
-        row = part[:, 1:] * s - part[:, :1] * c
-        second += s[:, :, None] * c[:, None, :] - c[:, :, None] * s[:, None, :]
-        radial = part[:, :1] * s + part[:, 1:] * c
-        second -= (2.0 / square)[:, None, None] * row[:, :, None] * radial[:, None, :]
-        result: Array = (2.0 * self.sign * force[:, 0] / square)[:, None, None] * second
         return result
 
 

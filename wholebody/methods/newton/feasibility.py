@@ -6,12 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.iteration import Iteration
-from wholebody.methods.newton.linear_algebra import LinearSystem, QuasiDefinite, SingularSystemError
-from wholebody.methods.newton.settings import ENDINGS, FRAMES, STEPS
-from wholebody.methods.newton.system import ActiveSystem, System
+from wholebody.methods.newton.settings import ENDINGS, FRAMES
+from wholebody.methods.newton.system import ActiveSystem
 
 
 class FeasibilityResult(NamedTuple):
@@ -120,81 +119,3 @@ def _improve_goals(run: Iteration, iterations: int, tolerance: float) -> None:
     if run.hard > tolerance or run.goal > goal:
         run.go_back(best)
     run.stationary = stationary
-
-
-class Projection(NamedTuple):
-    """The end (7 n,), the largest error of the KKT system before each iteration and there, and whether that is met."""
-
-    x: Array
-    errors: tuple[float, ...]
-    met: bool
-
-
-def kkt_algebra(system: System) -> QuasiDefinite:
-    """The factorisation of the KKT matrix of a system's equations, analysed."""
-    rows, columns, _ = system.curvature(system.weight, np.zeros(system.pattern.height))
-    return QuasiDefinite(system.pattern, (rows, columns))
-
-
-def project(
-    system: System, algebra: QuasiDefinite, x: Array, anchor: Array, *, tolerance: float, iterations: int
-) -> Projection:
-    """Move x, which meets the equations, to the nearest place to the anchor (both (7 n,)), by the system's weights."""
-    damping = np.full(system.pattern.height, STEPS.hard_damping)
-    y = np.zeros(system.pattern.height)
-    residual, values = system.residual(x), system.values(x)
-    errors: list[float] = []
-    convexity = 0.0
-    for number in range(iterations + 1):
-        gradient = system.weight * (x - anchor)
-        slope = gradient - system.pattern.transpose_times(values, y)
-        errors.append(float(max(np.abs(slope).max(initial=0.0), np.abs(residual).max(initial=0.0))))
-        if errors[-1] <= tolerance or number == iterations:
-            break
-        task = LinearSystem(values, system.weight, damping, gradient, residual)
-        try:
-            second = -system.curvature(x, y)[2]
-            step, multiplier = algebra.solve(task, second)
-            convexity = max(1e-2, 0.3 * convexity) if not algebra.convex() else 0.0
-            while convexity and convexity < 1e6:  # far from the answer: more of D, until it is convex
-                raised = with_values(task, weight=(1.0 + convexity) * system.weight)
-                step, multiplier = algebra.solve(raised, second)
-                if algebra.convex():
-                    break
-                convexity *= 4.0
-        except SingularSystemError:
-            break
-        here, slope_along = _distance(system, x, anchor), float(gradient @ step)
-        for halving in range(12):
-            length = 0.5**halving
-            trial, found = _brought_back(system, algebra, task, x + length * step, 0.1 * tolerance)
-            most = here * (1.0 + 1e-12) + 1e-4 * length * slope_along  # rounding, and Armijo's decrease
-            good = np.abs(found).max(initial=0.0) <= tolerance
-            if good and _distance(system, trial, anchor) <= most:
-                break
-        else:
-            break
-        x, y, residual, values = trial, multiplier, found, system.values(trial)
-    return Projection(x, tuple(errors), errors[-1] <= tolerance)
-
-
-def _brought_back(
-    system: System, algebra: QuasiDefinite, task: LinearSystem, x: Array, tolerance: float
-) -> tuple[Array, Array]:
-    """The variables (7 n,) moved by Newton steps until the equations hold, and their residual there."""
-    residual = system.residual(x)
-    for _ in range(8):
-        if not np.isfinite(residual).all() or np.abs(residual).max(initial=0.0) <= tolerance:
-            break
-        back = with_values(task, values=system.values(x), gradient=np.zeros(len(x)), residual=residual)
-        try:
-            x = x + algebra.solve(back)[0]
-        except SingularSystemError:
-            break
-        residual = system.residual(x)
-    return x, residual
-
-
-def _distance(system: System, x: Array, anchor: Array) -> float:
-    way = x - anchor
-    return float(0.5 * (system.weight * way) @ way)

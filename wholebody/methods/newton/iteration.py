@@ -73,6 +73,7 @@ class Iteration:
         self.begin(active_system.retract(x))
         self.residuals = [max(self.hard, self.goal)]
         self.systems, self.stationary = 0, False
+        self.anchor: Array | None = None  # (7 n,) from where the motion is measured while measures are lowered
         self.least_damping = 0.0
 
     @property
@@ -239,7 +240,8 @@ class Iteration:
         if measures == "lower":
             asked[self.objective] = self.residual[self.objective] / (1.0 + damping / STEPS.first_damping)
         diagonal[self.objective] = FREE if measures == "ignore" else 1.0 / self.system.stiffness[self.objective]
-        gradient = np.zeros_like(self.x)
+        anchor = self.x if self.anchor is None or measures != "lower" else self.anchor
+        gradient = self.system.weight * (self.x - anchor)
         rows, phi = self.one_sided, self.residual[self.one_sided]
         base = diagonal[rows]
         at = np.zeros_like(self.x)

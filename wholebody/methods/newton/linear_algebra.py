@@ -240,22 +240,18 @@ def compiled_kernel(_: Any) -> None:
 
 
 class QuasiDefinite:
-    """L D L' of [H, -J'; -J, -M], H diagonal or sparse, with AMD ordering (Vanderbei 1995, quasi-definite matrices)."""
+    """L D L' of [D, -J'; -J, -M] with AMD ordering (Vanderbei 1995, quasi-definite matrices)."""
 
     name = "kkt/ldlt"
 
-    def __init__(self, pattern: Pattern, second: tuple[Indices, Indices] | None = None) -> None:
-        """Build and analyse; `second` are rows and columns (k,) of the lower triangle of second derivatives."""
+    def __init__(self, pattern: Pattern) -> None:
+        """Build and analyse."""
         import eigenpy
         from scipy.sparse import csc_matrix
 
-        n, m = pattern.width, pattern.height
-        none = np.zeros(0, dtype=np.intp)
-        row, column = second if second is not None else (none, none)
-        size = n + m
-        self._seconds = len(row)
-        rows = np.concatenate([np.arange(size), n + pattern.rows, row])
-        columns = np.concatenate([np.arange(size), pattern.columns, column])
+        size = pattern.width + pattern.height
+        rows = np.concatenate([np.arange(size), pattern.width + pattern.rows])
+        columns = np.concatenate([np.arange(size), pattern.columns])
         places, index = np.unique(columns * size + rows, return_inverse=True)
         pointer = np.searchsorted(places // size, np.arange(size + 1)).astype(np.int32)
         self.pattern, self._index = pattern, index
@@ -269,12 +265,11 @@ class QuasiDefinite:
         """Non-zeros of the last factor."""
         return int(self._factor.matrixL().nnz)
 
-    def solve(self, system: LinearSystem, second: Array | None = None) -> tuple[Array, Array]:
-        """Refill, refactorise, solve; `second` (k,) are the values of the second derivatives."""
+    def solve(self, system: LinearSystem) -> tuple[Array, Array]:
+        """Refill, refactorise, solve."""
         n, values = self.pattern.width, system.values
         least = 1e-10 / system.weight.min(initial=1.0)  # makes the matrix quasi-definite; smaller = less stable
-        extra = np.zeros(self._seconds) if second is None else second
-        data = np.concatenate([system.weight, -np.maximum(system.damping, least), -values, extra])
+        data = np.concatenate([system.weight, -np.maximum(system.damping, least), -values])
         self._matrix.data[:] = np.bincount(self._index, data, len(self._matrix.data))
         self._factor.factorize(self._matrix)
         if self._factor.info() != self._success:
@@ -291,11 +286,6 @@ class QuasiDefinite:
             raise SingularSystemError("the equations depend on each other; damp them")
         return found[:n], found[n:]
 
-    def convex(self) -> bool:
-        """Whether the last matrix is positive definite on the null space of J: its inertia is (n, m, 0)."""
-        pivots = self._factor.vectorD()
-        return int((pivots < 0.0).sum()) == self.pattern.height
-
 
 LinearAlgebra = NormalEquations | QuasiDefinite
 """A factorisation for one pattern."""
@@ -307,11 +297,11 @@ def dense_columns(pattern: Pattern) -> Indices:
 
 
 def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
-    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns."""
-    # With hundreds of dense columns (a body near everything), the small dense systems of a step took 2 s.
+    """The factorisation of this name for a pattern; "auto" splits off the dense columns of up to two bodies."""
+    # Each takes a solve: of two people, with 32 of them, splits took 8 ms and "kkt" 2, with hundreds splits took 2 s.
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
-    if name == "schur" or (name == "auto" and 0 < len(dense) <= 50):
+    if name == "schur" or (name == "auto" and 0 < len(dense) <= 14):
         return NormalEquations(pattern, dense)
     if name == "kkt" or (name == "auto" and len(dense)):
         return QuasiDefinite(pattern)

@@ -161,12 +161,17 @@ def refine(
     *,
     tolerance: float,
     rounds: int = REFINEMENT.rounds,
+    anchor: Array | None = None,
 ) -> tuple[Array, int]:
-    """Lower the measures from x (7 n,), where all equations hold: variables, and the number of iterations."""
+    """Lower the measures from x (7 n,), where all equations hold: variables, and the number of iterations.
+
+    With an anchor (7 n,) the measure is the squared motion from there (eq. 1), whose second derivative a step has.
+    """
     run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
     run.iterate(REFINEMENT.back, goals=True, measures="keep")
     if not run.met:
         return x, 0
+    run.anchor = anchor
     descent = _Descent(run, measure, tolerance)
     for _ in range(rounds):
         if not descent.lower():
@@ -181,6 +186,7 @@ class _Descent:
         self._run, self._measure, self._tolerance = run, measure, tolerance
         self.best, self._least = run.x, measure(run.x)
         self._share, self._memory, self._system = 1.0, Anderson(), run.system
+        self._motion = REFINEMENT.motion if run.anchor is None else 1.0
         self._step: Array | None = None  # of the model at the best state, once it is known
 
     def lower(self) -> bool:
@@ -188,7 +194,7 @@ class _Descent:
         run, fast = self._run, None
         if self._step is None:
             try:
-                self._step = run.step(0.0, 1.0, 1.0, True, "lower", REFINEMENT.motion)
+                self._step = run.step(0.0, 1.0, 1.0, True, "lower", self._motion)
             except SingularSystemError:
                 return False
             fast = self._memory.propose(self._step)

@@ -164,10 +164,6 @@ class AssemblyConstraint(ABC):
     def jacobian(self, x: Array) -> Array:
         """(m, b, 7) its derivative by the bodies."""
 
-    def curvature(self, x: Array, force: Array) -> Array:
-        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it."""
-        raise InputError(f"{type(self).__name__} has no second derivatives; write curvature, or leave nearest out")
-
 
 class OwnRows(Batch):
     """The rows of one constraint of a user's class."""
@@ -186,12 +182,6 @@ class OwnRows(Batch):
         pair = x[self.bodies[0]]
         found = np.asarray(self.term.jacobian(pair), dtype=float)
         return _finite(found, (self.size, len(pair), 7), self.labels[0], "jacobian").reshape(1, self.size, -1)
-
-    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        pair = x[self.bodies[0]]
-        found = np.asarray(self.term.curvature(pair, force[0]), dtype=float)
-        shape = (len(pair), 7, len(pair), 7)
-        return _finite(found, shape, self.labels[0], "curvature").reshape(1, 7 * len(pair), -1)
 
 
 def checked(term: AssemblyConstraint, x: Array, label: str) -> int:

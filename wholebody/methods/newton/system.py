@@ -63,7 +63,6 @@ class System:
             rows.append(np.broadcast_to(row, mask.shape)[mask])
             columns.append(np.broadcast_to(column[:, None, :], mask.shape)[mask])
         self.pattern = Pattern(np.concatenate(rows), np.concatenate(columns), int(self.starts[-1]), len(weight))
-        self._curvature_places: tuple[Indices, Indices, list[Indices]] | None = None
 
     def renew(self, batches: Sequence[Batch]) -> None:
         """Take other numbers for equations of the same pattern."""
@@ -107,36 +106,11 @@ class System:
         parts = zip(self.batches, self._masks, strict=True)
         return np.concatenate([np.zeros(0), *(batch.jacobian(bodies).ravel()[mask] for batch, mask in parts)])
 
-    def curvature(self, x: Array, force: Array) -> tuple[Indices, Indices, Array]:
-        """Second derivative of force (m,) times residual: rows, columns and values, to be summed where they repeat."""
-        bodies = self.bodies(x)
-        if self._curvature_places is None:
-            self._curvature_places = self._lay_curvature()
-        rows, columns, keeps = self._curvature_places
-        values = [np.zeros(0)]
-        for batch, start, stop, keep in zip(self.batches, self.starts, self.starts[1:], keeps, strict=False):
-            push = force[start:stop].reshape(len(batch), batch.size)
-            values.append(batch.curvature(bodies, push).ravel()[keep])
-        return rows, columns, np.concatenate(values)
-
     def label(self, row: int) -> str:
         """Name of a row in messages."""
         index = int(np.searchsorted(self.starts, row, side="right")) - 1
         batch = self.batches[index]
         return batch.labels[(row - int(self.starts[index])) // batch.size]
-
-    def _lay_curvature(self) -> tuple[Indices, Indices, list[Indices]]:
-        rows, columns, keeps = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], []
-        for batch in self.batches:
-            column = _columns(batch)
-            shape = (*column.shape, column.shape[1])
-            row = np.broadcast_to(column[:, :, None], shape)
-            other = np.broadcast_to(column[:, None, :], shape)
-            keep = np.flatnonzero((other >= 0) & (row >= other))
-            keeps.append(keep)
-            rows.append(row.ravel()[keep])
-            columns.append(other.ravel()[keep])
-        return np.concatenate(rows), np.concatenate(columns), keeps
 
 
 def _columns(batch: Batch) -> Indices:

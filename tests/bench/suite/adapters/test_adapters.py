@@ -99,7 +99,7 @@ def test_out_of_reach_by_a_metre_is_not_called_solved(adapter: Adapter, reach: w
     assert wb.assess(problem, solution.q).goal_error > 0.9
 
 
-@by_name
+@of_each
 def test_what_it_cannot_express_is_refused_by_name(adapter: Adapter, table: wb.Problem) -> None:
     if f"{adapter.name}/".startswith(("qp/", "newton/")):
         pytest.skip("it takes every term that there is")

@@ -10,9 +10,8 @@ import pytest
 from wholebody.bench.suite.compare.results import Chunk
 from wholebody.bench.suite.compare.solving import Task, work
 
-FROM_SCRATCH = True
-WAITS = 0.5  # s: of each solve of the method that sleeps
-CAP = 0.4  # s of the processor: more than a solve computes, and less than it waits
+WAITS = 0.3  # s: of each solve of the method that sleeps
+CAP = 0.2  # s of the processor: more than a solve computes, and less than it waits
 
 
 @pytest.fixture(scope="module")
