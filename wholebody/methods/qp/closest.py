@@ -52,7 +52,7 @@ class Closest(Stage):
 
     def look(self, q: Array, longest: float = np.inf) -> Iterate:
         """See `Stage.look`."""
-        return self.iterate_at(q, NEAREST.within if self.contacts else 0.0, longest, planes=False)
+        return self.iterate_at(q, NEAREST.within if self.contacts else 0.0, longest)
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits and constraints, shape (nq,)."""

@@ -89,7 +89,7 @@ class Stage:
     iterations: int  # most programs to solve
     note: str = ""  # what to call the programs in the trace
 
-    def iterate_at(self, q: Array, within: float, longest: float = np.inf, *, planes: bool = True) -> Iterate:
+    def iterate_at(self, q: Array, within: float, longest: float = np.inf, *, planes: bool = False) -> Iterate:
         """A posture (nq,) with the rows of pairs within a distance, metres; UndefinedTermError."""
         at = self.shared.lineariser.at(q, within, planes=planes)
         rows = self.shared.subproblem.rows(at)
