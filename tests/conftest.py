@@ -37,6 +37,7 @@ from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 from wholebody.view import browser, screenshot
 from wholebody.view.browser import Browser
+from wholebody.view.viewer import Viewer
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -301,9 +302,10 @@ class KeptBrowser(Browser):
 
 @pytest.fixture(autouse=True, scope="session")
 def kept_browsers() -> Iterator[None]:
-    """Let pictures be drawn by browsers that were started before."""
+    """Let pictures be drawn by browsers that were started before, and small ones where no size is stated."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(screenshot, "Browser", KeptBrowser.start)
+        patch.setattr(Viewer.picture, "__defaults__", ((320, 240),))
         os.register_at_fork(after_in_child=KeptBrowser.idle.clear)  # a browser listens to one process
         yield
     for kept in KeptBrowser.idle:

@@ -33,9 +33,7 @@ def test_rows_come_back_exactly(tmp_path_factory: pytest.TempPathFactory, rows: 
     assert list(path.parent.iterdir()) == [path], "nothing else is left beside it"
 
 
-@pytest.mark.parametrize(
-    "said", ["one\ntwo", "one\r\ntwo", "one\rtwo", "one\r", "\u2028", "\x85", '"\n', "# a: b\n# c: d"]
-)
+@pytest.mark.parametrize("said", ["one\r\ntwo", "one\r", "\u2028", "# a: b\n# c: d"])
 def test_line_breaks_in_a_cell_come_back(tmp_path: Path, said: str) -> None:
     write_rows(tmp_path / "rows.csv", {"processor": "a"}, [Row(said, "", {"count": 1}), Row("last", "", {"count": 2})])
     assert [row["case"] for row in csv_rows(tmp_path / "rows.csv")] == [said, "last"]

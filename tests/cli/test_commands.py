@@ -19,6 +19,7 @@ from tests.needs import each
 from tests.task_text import figure, point, table
 from wholebody.cli import main
 from wholebody.figures.packaged_urdf import task_paths
+from wholebody.geometry import convex
 from wholebody.methods import solve as solving
 from wholebody.view import browser, screenshot
 
@@ -314,6 +315,7 @@ def test_what_takes_long_is_told_on_stderr_once_and_the_cache_is_cleared(
     arm = str(root / "tests" / "data" / "arm" / "arm.urdf")
     said = []
     for _ in range(2):
+        convex._decomposed.cache_clear()  # as in another process
         assert main(["figure", arm]) == 0
         said.append(capsys.readouterr())
     first, again = said

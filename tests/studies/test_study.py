@@ -121,7 +121,8 @@ def test_a_person_takes_the_place_of_one_of_several_figures(folder: Path) -> Non
         '[[figure]]\nname = "human"\ncalled = "anna"\n[[figure]]\nname = "human"\ncalled = "ben"\nat = [0, 3, 0]\n'
     )
     held = "".join(hold(f"{name}/pelvis") for name in ("anna", "ben"))
-    (folder / "task.toml").write_text(figures + held + point("anna/right_index_tip", [3.0, -0.2, 1.2]))
+    quick = '[method]\nname = "qp"\nbudget = 0\n'
+    (folder / "task.toml").write_text(figures + held + point("anna/right_index_tip", [3.0, -0.2, 1.2]) + quick)
     people = [{"called": "anna", "stature": 1.6}, {"called": "anna", "stature": 1.9}, {"called": "ben", "stature": 1.9}]
     low, high, other = wb.study(folder / "task.toml", people=people)
     assert other.goal_error == pytest.approx(wb.study(folder / "task.toml", targets=[(3.0, -0.2, 1.2)])[0].goal_error)

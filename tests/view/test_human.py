@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,33 +10,12 @@ from PIL import Image
 
 from wholebody.figures import load
 from wholebody.figures.surface import surface_of
-from wholebody.geometry.shapes import Box, HalfSpace, Sphere
+from wholebody.geometry.shapes import HalfSpace
 from wholebody.scene.scene import Scene
 from wholebody.view import Viewer
 from wholebody.view.browser import Browser
 
 pytestmark = pytest.mark.browser
-
-
-def test_the_human_in_a_scene_is_where_pinocchio_says(browser: Browser, as_pinocchio_says: Any, nodes: Any) -> None:
-    figure = load("human", detail="hulls")
-    scene = Scene(figure)
-    scene.add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
-    scene.add(Box((0.5, 1.2, 0.03)), name="table", at=(0.6, 0.0, 0.75))
-    scene.attach(Sphere(0.08), to="thorax", name="pouch", at=(0.25, 0.0, 0.0))
-    with Viewer(scene) as viewer:
-        viewer.show(figure.posture("standing"), pieces=True)
-        scene.move("table", at=(0.8, 0.1, 0.7, 0.0, 0.0, 0.38268343, 0.92387953))
-        q = figure.posture("arms_forward")
-        viewer.show(q, pieces=True)
-        browser.open(viewer.url)
-        assert viewer.sync(10.0)
-        as_pinocchio_says(scene, q)
-        scene.remove("pouch")
-        viewer.show(q, pieces=True)
-        assert viewer.sync(10.0)
-        as_pinocchio_says(scene, q)
-        assert nodes(["/objects/pouch"]) == [None]
 
 
 def test_a_picture_of_the_human(chromium: str, tmp_path: Path) -> None:

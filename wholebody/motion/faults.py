@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+import coal
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.continuous.swept_depth import Depths
@@ -16,21 +18,18 @@ DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows
 DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collision
 
 
-def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
-    """Gaps that dip, however thin the things in their way, and the shares of each at which its pairs are deepest."""
-    found = dict[int, list[float]]()
+def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[int]]:
+    """Gaps that dip, however thin the things in their way, and the numbers of their pairs, the deepest first."""
+    found = dict[int, list[int]]()
     for gap, passing in _swept(workspace, q, gaps):
         if passing.depth.max(initial=0.0) > DIP:
-            deepest_first = np.argsort(-passing.depth, kind="stable").tolist()
-            found[gap] = []
-            for share in (float(passing.share[k]) for k in deepest_first if passing.depth[k] > DIP):
-                if all(abs(share - other) > 0.01 for other in found[gap]):  # nearly the same share is listed once
-                    found[gap].append(share)
+            deepest_first = np.argsort(-passing.depth, kind="stable")
+            found[gap] = [int(passing.number[place]) for place in deepest_first if passing.depth[place] > DIP]
     return found
 
 
 def depths_between(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
-    """How deep motions between frames dip, metres; see `dips`."""
+    """How deep motions between frames dip, metres; see `dipping`."""
     return {gap: float(passing.depth.max(initial=0.0)) for gap, passing in _swept(workspace, q, gaps)}
 
 
@@ -47,6 +46,47 @@ def _swept(workspace: Workspace, q: Array, gaps: Iterable[int]) -> Iterator[tupl
 def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
     """How deep the motion between two postures (nq,) dips, metres; see `SweptDepth.advance`."""
     return depths_between(workspace, np.stack([before, after]), [0])[0]
+
+
+def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
+    """Gaps that dip, and the shares of each at which its pairs are deepest; nearly the same share is listed once."""
+    found = dipping(workspace, q, gaps)
+    return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:6]) for gap, numbers in found.items()}
+
+
+def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
+    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers."""
+    # A corner dips in a hundredth of a gap: between the nearest of many places golden sections look.
+    model, data = workspace.model, workspace.model.createData()
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    pairs = [[workspace.geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[k]] for k in numbers]
+    joints = {piece.parentJoint for pieces in pairs for piece in pieces}
+    posed: dict[float, dict[int, pin.SE3]] = {}
+
+    def distance(pieces: list[pin.GeometryObject], share: float) -> float:
+        if share not in posed:
+            pin.forwardKinematics(model, data, pin.interpolate(model, before, after, share))
+            posed[share] = {joint: data.oMi[joint].copy() for joint in joints}
+        at = [posed[share][piece.parentJoint] * piece.placement for piece in pieces]
+        places = [coal.Transform3s(one.rotation, one.translation) for one in at]
+        result.clear()
+        found = coal.distance(pieces[0].geometry, places[0], pieces[1].geometry, places[1], request, result)
+        return float(found) if np.isfinite(found) else 0.1  # m, in place of a distance that coal does not find
+
+    contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
+    begun: tuple[float, ...] = () if contact is None else (contact.fraction, contact.fraction + 2e-3)
+    shares = sorted({*(k / 64.0 for k in range(65)), *begun})
+    kept, golden = list[float](), 0.5 * (5.0**0.5 - 1.0)
+    for pieces in pairs:
+        place = 1 + int(np.argmin([distance(pieces, share) for share in shares[1:-1]]))
+        low, high = shares[place - 1], shares[place + 1]
+        for _ in range(8):  # to a fiftieth of what is between two places
+            first, second = high - golden * (high - low), low + golden * (high - low)
+            low, high = (low, second) if distance(pieces, first) < distance(pieces, second) else (first, high)
+        deepest = float(0.5 * (low + high))
+        if all(abs(deepest - other) > 0.01 for other in kept):
+            kept.append(deepest)
+    return kept
 
 
 def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:
@@ -86,4 +126,4 @@ def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float =
         state = workspace.state
         wrong |= np.array([terms.missed(frame, state.update(posture)) > 1e-4 for frame, posture in enumerate(q, first)])
     quiet = [frame for frame in range(len(q) - 1) if not (wrong[frame] or wrong[frame + 1])]
-    return Faults(depths, wrong, list(dips(workspace, q, quiet)))
+    return Faults(depths, wrong, list(dipping(workspace, q, quiet)))

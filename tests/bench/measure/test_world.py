@@ -17,7 +17,6 @@ from wholebody.bench.measure.world import (
     measure,
     pile,
     stack,
-    throws,
 )
 from wholebody.cli.main import main
 
@@ -71,11 +70,3 @@ def test_the_command_writes_a_table(tmp_path: Path) -> None:
     assert main(run) == 0
     assert (tmp_path / "world-drops.csv").read_text().count("ball,wholebody") == 1
     assert "| ball | wholebody |" in (tmp_path / "world.md").read_text()
-
-
-def test_what_is_thrown_is_avoided_or_named() -> None:
-    swift = throws("ball", 10.0, "stands", True, 1)
-    assert swift["deep"] == swift["silent"] == 0
-    human = throws("ball", 20.0, "walks", False, 1)
-    assert human["silent"] == 0
-    assert human["named"] >= human["deep"]

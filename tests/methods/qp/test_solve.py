@@ -341,3 +341,24 @@ def test_the_message_says_what_is_known_of_a_goal_that_is_not_met():
     short = wb.solve(behind_a_panel(21), wb.methods.QP(restarts=0))
     assert short.status == "unreachable"
     assert short.message.startswith("not found from ")
+
+
+@pytest.mark.parametrize("programs", [6, 20])
+def test_a_descent_that_runs_out_of_programs_ends_on_its_constraints(human: wb.Figure, programs: int) -> None:
+    """A wish 3 m away draws two hands that stay together; the posture is nearer to it than the start, and feasible."""
+    start = human.with_joints(human.posture("standing"), {"left_elbow_flexion": 1.2, "right_elbow_flexion": 1.2})
+    away = (3.0, 0.0, 1.0)
+    problem = wb.Problem(
+        wb.Scene(human), start, goals=[wb.Relative("left_palm", "right_palm", orientation=False)],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
+        measures=[wb.Soft(wb.Point("right_palm", away))],
+    )  # fmt: skip
+    solution = wb.solve(problem, wb.methods.QP(iterations=programs))
+    assert solution.status == "solved"
+    before, after = (np.linalg.norm(human.placement(q, "right_palm").translation - away) for q in (start, solution.q))
+    assert after < before - 0.1
+    apart = [
+        human.placement(q, "right_palm").actInv(human.placement(q, "left_palm")).translation
+        for q in (start, solution.q)
+    ]
+    np.testing.assert_allclose(apart[1], apart[0], atol=1e-5)

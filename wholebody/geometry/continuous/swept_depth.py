@@ -40,7 +40,6 @@ class Depths(NamedTuple):
 
     number: Indices  # (k,) places among the collision pairs of the geometry model, ascending
     depth: Array  # (k,) metres, positive
-    share: Array  # (k,) of the motion at which a pair was found to be deepest; 1 at a posture
 
 
 class SweptDepth:
@@ -85,7 +84,7 @@ class SweptDepth:
             self._ask(before, unknown)
             still = before.least[doubtful] + now.least[doubtful] - speed[doubtful] < 0.0
             doubtful = doubtful[still]
-        passing = self._between(doubtful, speed, velocity) if len(doubtful) else Depths(doubtful, *np.zeros((2, 0)))
+        passing = self._between(doubtful, speed, velocity) if len(doubtful) else Depths(doubtful, np.zeros(0))
         self._q = q
         return found, passing
 
@@ -110,7 +109,7 @@ class SweptDepth:
         now = self._now
         self._ask(now, numbers)
         overlap = numbers[now.rows[numbers, 0] < 0.0]
-        return Depths(overlap, -now.rows[overlap, 0], np.ones(len(overlap)))
+        return Depths(overlap, -now.rows[overlap, 0])
 
     def _ask(self, place: _Postures, numbers: Indices) -> None:
         self.asked += len(numbers)
@@ -123,7 +122,6 @@ class SweptDepth:
         stack = _Stack(self._before.places, self._now.places)
         rows0, rows1 = self._before.rows[doubtful], self._now.rows[doubtful]
         deepest = np.maximum(0.0, -np.minimum(rows0[:, 0], rows1[:, 0]))  # found
-        at = np.where(rows1[:, 0] < rows0[:, 0], 1.0, 0.0)  # where that is
         bound = np.zeros(len(doubtful))  # proved
         which, share = np.arange(len(doubtful)), 1.0
         first, last = np.zeros(len(doubtful), dtype=np.intp), np.ones(len(doubtful), dtype=np.intp)
@@ -141,14 +139,12 @@ class SweptDepth:
             which, first, last, share = which[going], first[going], last[going], 0.5 * share
             middle, rows = self._halfway(stack, first, share, doubtful[which], velocity)
             rows0, rows1 = rows0[going], rows1[going]
-            for row in np.flatnonzero(-rows[:, 0] > deepest[which]).tolist():
-                if -rows[row, 0] > deepest[which[row]]:
-                    deepest[which[row]], at[which[row]] = -rows[row, 0], stack.times[middle[row]]
+            np.maximum.at(deepest, which, -rows[:, 0])
             which, first, last = np.tile(which, 2), np.concatenate([first, middle]), np.concatenate([middle, last])
             rows0, rows1 = np.concatenate([rows0, rows]), np.concatenate([rows, rows1])
         depth = np.where(bound > self._tolerance, np.maximum(bound, deepest), deepest)
         deep = np.flatnonzero(depth > 0.0)
-        return Depths(doubtful[deep], depth[deep], at[deep])
+        return Depths(doubtful[deep], depth[deep])
 
     def _halfway(
         self, stack: _Stack, first: Indices, share: float, numbers: Indices, velocity: Array

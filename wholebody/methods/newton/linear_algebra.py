@@ -297,11 +297,11 @@ def dense_columns(pattern: Pattern) -> Indices:
 
 
 def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
-    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns."""
-    # With hundreds of dense columns (a body near everything), the small dense systems of a step took 2 s.
+    """The factorisation of this name for a pattern; "auto" splits off the dense columns of up to two bodies."""
+    # Each takes a solve: of two people, with 32 of them, splits took 8 ms and "kkt" 2, with hundreds splits took 2 s.
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
-    if name == "schur" or (name == "auto" and 0 < len(dense) <= 50):
+    if name == "schur" or (name == "auto" and 0 < len(dense) <= 14):
         return NormalEquations(pattern, dense)
     if name == "kkt" or (name == "auto" and len(dense)):
         return QuasiDefinite(pattern)

@@ -23,6 +23,7 @@ from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7
+LAST = 8  # programs that lead back to the constraints where the measures still decrease: from 1e-2 m or rad beside them
 
 
 @dataclass
@@ -61,8 +62,10 @@ class SQP(Stage):
         count, converged = 0, False
         while count < self.iterations and not self.shared.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
-                converged = True
+                converged = self._kept is None
                 break
+            if self._kept is not None and count >= max(self.iterations - LAST, self.iterations / 2):
+                self.measures = False
             count += 1
             size = StepSize(self._radius, 0.0 if self._full_step else self._pull, self._damping, self.measures)
             program = self.shared.subproblem.program(self._bent(here), here.rows, size, self._shift)

@@ -147,20 +147,6 @@ def test_a_set_that_cannot_be_built_is_an_error_with_its_reason(fakes: ModuleTyp
         run(asked, tmp_path)
 
 
-def test_a_local_dask_cluster_gives_the_same(fakes: ModuleType, tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
-    from wholebody.base.batches import threads
-
-    asked = settings(fakes, "solves", "refuses", cases=2)
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None
-    ) as cluster:
-        assert threads(cluster.scheduler_address) == 2
-        store = run(asked, tmp_path / "cluster", 2, cluster.scheduler_address)
-    by_method = sorted(timeless(store.records), key=str)
-    assert by_method == sorted(timeless(run(asked, tmp_path / "here").records), key=str)
-
-
 def test_a_cluster_that_is_not_there_is_one_sentence() -> None:
     pytest.importorskip("distributed")
     from wholebody.base.batches import threads
