@@ -140,8 +140,7 @@ class Multistart:
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
         beside = self._beside(0 if few or least or not self.problem.goals else min(count, SEARCH.beside))
-        # In turn, so that neither kind uses up the budget: one from beside the goals takes the programs of two others.
-        for _ in range(count + len(self._through)):
+        for _ in range(count + len(self._through)):  # in turn: one from beside takes the programs of two others
             yield Attempt(islice(beside, 1), self._free, "from beside the goals")
             yield Attempt(islice(starts, 2), self._relaxed, "from another start")
 
