@@ -140,9 +140,9 @@ class Multistart:
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
         starts = self.lineariser.defined(chain(self._through, others))
         beside = self._beside(0 if few or least or not self.problem.goals else min(count, SEARCH.beside))
-        for _ in range(count + len(self._through)):  # in turn: neither kind uses up the budget
-            yield Attempt(islice(beside, SEARCH.turn), self._free, "from beside the goals")
-            yield Attempt(islice(starts, SEARCH.turn), self._relaxed, "from another start")
+        for _ in range(count + len(self._through)):  # in turn: one from beside takes the programs of two others
+            yield Attempt(islice(beside, 1), self._free, "from beside the goals")
+            yield Attempt(islice(starts, 2), self._relaxed, "from another start")
 
     def _without_measures(self, start: Array) -> LocalSolution | None:
         """Seek a feasible posture so that no measure changes what is reached, and descend; None: nothing but start."""

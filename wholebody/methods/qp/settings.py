@@ -172,7 +172,6 @@ class SearchNumbers(NamedTuple):
     relaxation_depth: float = 0.15
     # probes from beside goals. More: goals behind things are found more often, and what none reaches takes longer.
     beside: int = 40
-    turn: int = 2  # probes of one kind before those of another. More: what one kind finds comes earlier, or later.
     displaced: float = 0.5  # m, rad: of goals along each axis, the standard deviation. Less: the same side of things.
     # tolerances within which such a relaxed probe must come for the second one to follow. More: more second ones in
     # vain.
