@@ -6,7 +6,8 @@ With the inertia M of the joints, springs K and dampers R towards a tracker, a s
 
 e from the figure to the tracker, c the forces of motion and weight. The springs are implicit, so any are stable. The
 impulses p are equation 9 of Schmidl and Lin with the whole articulated body in it, J M^-1 J^T in place of its mass and
-inertia: what is hit anywhere moves all joints. Impacts come first, without forces; a step ends where the next begins.
+inertia: what is hit anywhere moves all joints. All contacts of the figure, and of what touches it with other things,
+have one program. Impacts come first, without forces; a step ends where the next begins.
 M and c are those half way (midpoint rule); joints without springs, in a step without contacts, move by the mean of v
 and v+. A root without spring and damper ends a step with the momentum that impulses and weight gave what it carries;
 the velocities beside that are scaled so that energy is conserved where nothing drives or touches the figure.
