@@ -37,7 +37,6 @@ PLACES = {"within reach": (0.4, -0.25, 1.15), "out of reach": (1.1, 0.3, 1.5), "
     "method",
     [
         wb.methods.QP(budget=60, restarts=3, time_limit=None),
-        wb.methods.QP(solver="daqp", budget=60, restarts=3, time_limit=None),
         wb.methods.DampedLeastSquares(iterations=30, time_limit=None),
     ],
     ids=lambda method: method.name,

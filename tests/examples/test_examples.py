@@ -381,7 +381,7 @@ def test_takes_a_seat_and_lifts_a_box(example: Example, solved: Any, tmp_path: P
 def test_who_lifts_a_box_lifts_with_both_arms_alike(example: Example) -> None:
     """Scene, box and goals are the same on both sides; arms of short and tall women differed by up to 132 degrees."""
     box = example("lift_a_box")
-    for percentile in (3, 66, 97):
+    for percentile in (3, 97):
         problem = box.build(figure := wb.load("human", sex="female", percentile=percentile))
         _, lifted = box.lift(wb.solve(problem), problem)
         assert lifted.status == "solved"
@@ -521,10 +521,10 @@ def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
     assert module.main(out=tmp_path, pictures=False) == 3
 
 
-@pytest.mark.parametrize(("name", "measures"), [("driver", True), ("hold_a_pole", False)])
-def test_hands_hold_what_they_are_told(name: str, measures: bool, example: Example) -> None:
+@pytest.mark.parametrize("name", ["driver", "hold_a_pole"])
+def test_hands_hold_what_they_are_told(name: str, example: Example) -> None:
     problem = example(name).build()
-    solution = wb.solve(problem, wb.methods.QP(measures=measures))
+    solution = wb.solve(problem, wb.methods.QP(measures=False))
     assert solution.solved
     least, where = deepest(problem, solution.q)
     assert least > -1e-5, where

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,30 @@ def test_an_arm_has_all_of_its_postures(arm: wb.Figure) -> None:
     assert best[0].assessment.measure == pytest.approx(measures[0], rel=1e-6)
     again = wb.solutions(problem)
     assert [tuple(answer.q) for answer in again] == [tuple(answer.q) for answer in found]
+
+
+def test_a_posture_at_a_limit_that_few_starts_lead_to_is_found(planar_arm: Callable[..., wb.Figure]) -> None:
+    """The third hinge rests at its limit; the two others follow from two sides and an angle of a triangle."""
+    start = np.array((1.60794338, -0.56728906, -0.83738104))
+    tip, (first, second, third), limit = np.array((0.24102766, 0.67877338)), (0.5, 0.4, 0.3), 2.5
+
+    def at(end: float) -> np.ndarray:
+        """The posture with this angle of the third hinge whose second one bends to the left."""
+        outer = np.hypot(second + third * np.cos(end), third * np.sin(end))
+        aside = np.arctan2(third * np.sin(end), second + third * np.cos(end))
+        inner = np.arccos((tip @ tip - first**2 - outer**2) / (2.0 * first * outer))
+        turn = np.arctan2(tip[1], tip[0]) - np.arctan2(outer * np.sin(inner), first + outer * np.cos(inner))
+        return np.array((turn, inner - aside, end))
+
+    figure = planar_arm((first, second, third), limit=limit)
+    weights = figure.effort_weights
+    here, inwards = (float(weights @ (at(end) - start) ** 2) for end in (-limit, -limit + 0.01))
+    assert here < inwards
+    problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Point("tip", (*tip, 0.0))])
+    assert figure.placement(at(-limit), "tip").translation[:2] == pytest.approx(tip, abs=1e-7)
+    found = wb.solutions(problem)
+    assert found.complete
+    assert min(np.abs(answer.q - at(-limit)).max() for answer in found) < 1e-4
 
 
 def test_what_is_in_the_way_leaves_the_others(arm: wb.Figure) -> None:

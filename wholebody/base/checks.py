@@ -188,7 +188,7 @@ def known(
 
 def listed(value: object, what: str, example: str) -> list[Any]:
     """The entries of a list, a tuple or another iterable that is no text."""
-    if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
+    if type(value) is list or (isinstance(value, Iterable) and not isinstance(value, (str, bytes))):
         try:
             return list(value)
         except TypeError:  # an array without dimensions

@@ -23,7 +23,7 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.figure_points import Moved, Points, axes_of
-from wholebody.dynamics.frame import EngineFrame
+from wholebody.dynamics.frame import EngineFrame, Event
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.figures.state import free_roots
@@ -116,8 +116,7 @@ class Articulated:
         most = time
         while True:
             done, frame = self._attempt(most, time, aim, steady, moved, segments)
-            hits = () if frame is None else (e for e in frame.events if e.speed > BOUNCE)
-            met = [e.time for e in hits if not segments.keys().isdisjoint((e.first, e.second))]
+            met = [] if frame is None else [event.time for event in _met(frame, segments)]
             if not met or done <= SHORTEST or back is None:
                 self.frames += [] if frame is None else [frame]
                 return done
@@ -152,10 +151,8 @@ class Articulated:
         drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time)
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        work = sum(
-            np.einsum("ij,ij->i", one, (points.figure @ (0.5 * mean)).reshape(-1, 3))
-            for one, mean in ((blow, start + begin), (bearing, unborne + after))
-        )
+        first, last = (points.figure @ (0.5 * both) for both in (start + begin, unborne + after))
+        work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
         paid = float(motor @ moves) + float(work[points.driven].sum())
@@ -167,8 +164,23 @@ class Articulated:
             return time, None
         frame = engine.advance(time, motions)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
-        self._react(frame.wrenches, twists, segments)
+        self._react(self._left_for_later(frame, segments) if time <= SHORTEST else frame.wrenches, twists, segments)
         return time, frame
+
+    def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int]) -> dict[str, Array]:
+        """The wrenches of the shortest step without its impacts with the figure, which the next step has at its start.
+
+        To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere.
+        """
+        wrenches = dict(frame.wrenches)
+        for event in frame.given if _met(frame, segments) else ():
+            for own, other, impulse in (
+                (event.first, event.second, event.impulse), (event.second, event.first, -event.impulse)
+            ):  # fmt: skip
+                if own in segments and self._engine is not None:
+                    self._engine.push(other, -impulse, event.point)
+                    wrenches[own] = wrenches[own] + np.hstack([impulse, cross(event.point, impulse)])
+        return wrenches
 
     def _points(self, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, and the joint limits that it can reach."""
@@ -370,3 +382,12 @@ class Articulated:
         pushed, first = inertia @ self.velocity, model.idx_vs
         momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
         self._settle(energy, 1.0, momenta)
+
+
+def _met(frame: EngineFrame, segments: Mapping[str, int]) -> list[Event]:
+    """The impacts of a frame with the figure."""
+    return [
+        event
+        for event in frame.events
+        if event.speed > BOUNCE and not segments.keys().isdisjoint((event.first, event.second))
+    ]

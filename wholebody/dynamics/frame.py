@@ -53,6 +53,7 @@ class EngineFrame(NamedTuple):
         steps: how many steps were made, those made again included.
         sleeping: bodies that sleep.
         wrenches: the impulses with their moments about the world's origin, (6,), N s and N m s.
+        given: every impulse of what is moved, as an event; the speed of one that is no impact is 0.
     """
 
     events: tuple[Event, ...]
@@ -66,6 +67,7 @@ class EngineFrame(NamedTuple):
     steps: int
     sleeping: int
     wrenches: Mapping[str, Array]
+    given: tuple[Event, ...]
 
 
 @dataclass
@@ -78,6 +80,7 @@ class FrameRecord:
     impulse: Array  # (n, 6) of each body, with its moment about the origin
     time: float = 0.0
     events: list[Event] = field(default_factory=list)
+    given: list[Event] = field(default_factory=list)
     contacts: int = 0
     deepest: float = 0.0
     work: float = 0.0
@@ -92,7 +95,7 @@ class FrameRecord:
         return EngineFrame(
             tuple(self.events), {names[k]: self.impulse[k, :3] for k in pushed}, self.contacts, self.deepest, energy,
             self.work, self.signorini, self.coulomb, self.steps, sleeping,
-            {names[k]: self.impulse[k] for k in pushed},
+            {names[k]: self.impulse[k] for k in pushed}, tuple(self.given),
         )  # fmt: skip
 
 

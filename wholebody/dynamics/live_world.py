@@ -191,11 +191,11 @@ class LiveWorld:
     def _goal(self, name: str, place: Array, clamped: bool = False) -> None:
         """Follow a place with a handle; a place from outside that jumps is followed at a bounded speed."""
         if name not in self._goals:
-            self._goals[name], self._tracker = self._tracked_place(name), None
-        if clamped:
-            way = place - self._goals[name]
-            length = float(np.linalg.norm(way))
-            place = self._goals[name] + way * min(1.0, FASTEST * self.world.dt / max(length, 1e-12))
+            self._tracker = None
+        if clamped:  # from where the handle is: a goal that ran far out of reach would be long on its way back
+            here = self._tracked_place(name)
+            length = float(np.linalg.norm(place - here))
+            place = here + (place - here) * min(1.0, FASTEST * self.world.dt / max(length, 1e-12))
         self._goals[name] = place
 
     def _pull(self, place: Array) -> None:

@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, cross
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
@@ -287,6 +287,8 @@ class RigidBodies:
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
+        by = np.flatnonzero(impulse.any(axis=1) & state.bodies.given[program.points.bodies].any(axis=1))
+        record.given += self._events(program, record.time, by, np.zeros(len(by)), impulse[by])
         wrench = np.hstack([impulse, cross(program.points.point, impulse)])
         np.add.at(record.impulse, program.points.bodies[:, 1], wrench)
         np.add.at(record.impulse, program.points.bodies[:, 0], -wrench)
@@ -345,10 +347,17 @@ class RigidBodies:
             body = bodies[given, side]
             velocity = state.velocity[body] + cross(state.spin[body], place[given] - state.bodies.position[body])
             record.work += sign * float((impulse[given] * velocity).sum())
-        named = [(self.names[first], self.names[second]) for first, second in bodies.tolist()]
-        record.events += [
-            Event(record.time, *names, *each)
-            for names, *each in zip(named, place, points.normal[number], events[:, 1].tolist(), impulse, strict=True)
+        met = self._events(program, record.time, number, events[:, 1], impulse)
+        record.events += met
+        record.given += [met[k] for k in np.flatnonzero(state.bodies.given[bodies].any(axis=1))]
+
+    def _events(self, program: StepProgram, time: float, number: Indices, speed: Array, impulse: Array) -> list[Event]:
+        """Impulses (k, 3) on B at points (k,), with speeds (k,) of approach, as events."""
+        points, bodies = program.points, program.points.bodies[number].tolist()
+        values = zip(points.point[number], points.normal[number], speed.tolist(), impulse, strict=True)
+        return [
+            Event(time, self.names[first], self.names[second], *each)
+            for (first, second), each in zip(bodies, values, strict=True)
         ]
 
     def _find_near(self, time: float) -> float:

@@ -390,4 +390,4 @@ _HAND_COLUMNS = {
 
 def keyed_hand(part: str, quantity: str) -> float:
     """Return "length" (in hand lengths), "width" or "depth" (semi-axes, in hand breadths) of one part of the hand."""
-    return float(keyed("hand", "name")[part][_HAND_COLUMNS[quantity]])
+    return float(keyed("hand")[part][_HAND_COLUMNS[quantity]])

@@ -157,7 +157,7 @@ def _knuckle(size: Dimensions, finger: str) -> Array:
 def finger_joints(side: str, finger: str, key: str, parent: str, segment: str, origin: pin.SE3) -> Iterator[Joint]:
     """The joints from the segment before a part of a finger to the part, whose row in the table "hand" is `key`."""
     sign = 1.0 if side == "left" else -1.0
-    row = keyed("hand", "name")[key]
+    row = keyed("hand")[key]
     kinds = [kind.strip() for kind in row["joints"].split(",")]
     ranges = [limits.strip().split("..") for limits in row["limits_deg"].split(";")]
     for kind, (low, high) in zip(kinds, ranges, strict=True):
@@ -225,7 +225,7 @@ def finger_degrees(degrees: Mapping[str, float]) -> dict[str, float]:
     found = {}
     for finger, parts in FINGERS.items():
         for part in ("mc", *parts) if finger == "thumb" else parts:
-            row = keyed("hand", "name")[f"{finger}_{part}"]
+            row = keyed("hand")[f"{finger}_{part}"]
             for kind, neutral in zip(row["joints"].split(","), row["neutral_deg"].split(";"), strict=True):
                 joint = _JOINT[kind.strip()]
                 found[f"{finger}_{joint}"] = degrees.get(f"{finger}_{joint}", degrees.get(joint, float(neutral)))

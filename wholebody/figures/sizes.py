@@ -93,7 +93,7 @@ def arm_sizes(
     sex: str, of: Mapping[str, float], stated: Collection[str], frame: Skeleton
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return the sizes of the arms on a frame, and the dimensions that follow, metres; stated ones are met first."""
-    rows = keyed("arm_sizes", "name")
+    rows = keyed("arm_sizes")
     usual = np.array([float(rows[name][sex]) for name in ARM]) * of["stature"]
     spread = np.array([float(rows[name]["spread"]) for name in ARM])
     hand, shoulder = of["hand_length"], of["acromial_height"]  # the acromion is where it was measured

@@ -34,14 +34,14 @@ def named_angles(of: str) -> dict[str, dict[str, float]]:
 
 
 @cache
-def keyed(name: str, column: str) -> dict[str, Row]:
-    """Return the rows of a table by the text in one column."""
-    return {row[column]: row for row in table(name)}
+def keyed(name: str) -> dict[str, Row]:
+    """Return the rows of a table by the text in its column "name"."""
+    return {row["name"]: row for row in table(name)}
 
 
 def named_row(name: str, key: str, what: str) -> Mapping[str, str]:
     """Return the row of a table that has a name in its column "name"."""
-    rows = keyed(name, "name")
+    rows = keyed(name)
     if key not in rows:
         raise UnknownNameError(what, key, rows)
     return rows[key]

@@ -77,9 +77,9 @@ def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
     return coal.Convex(vertices, triangles)
 
 
-def check_points(points: ArrayLike, what: str) -> Array:
+def check_points(points: ArrayLike) -> Array:
     """Points as a float array (n, 3) without duplicates; an InputError if they are none, or farther than `LARGEST`."""
-    return np.unique(_finite_points(points, what), axis=0)
+    return np.unique(_finite_points(points, "Hull"), axis=0)
 
 
 def _finite_points(points: ArrayLike, what: str) -> Array:

@@ -201,10 +201,14 @@ def built_figure(figure: Figure) -> dict[str, str]:
             own = len(groups) - 1
         first[joint] = own
     places, names = [at[group[-1]] for group in groups], list[dict[str, str]]()
-    for group, place in zip(groups, places, strict=True):
+    for number, (group, place) in enumerate(zip(groups, places, strict=True)):
         away = np.round(np.linalg.norm(real[group] - place, axis=1), 3)
         meeting = group[len(group) - 1 - int(np.argmin(away[::-1]))]  # of those at the place the last one
         named = {"wrist": group[0], "ankle": group[-1], "head": group[-1], "": meeting}
+        if number in parents:  # thighs stand straight, though a leg may be beside where its axes meet
+            aside = real[group, :2] - places[parents.index(number)][:2]
+            if np.linalg.norm(aside[group.index(meeting)]) - np.linalg.norm(aside[-1]) > near:
+                named["hip"] = group[-1]
         names.append({part: model.names[joint] for part, joint in named.items()})
     for number, group in enumerate(groups):  # where links end
         if number not in parents and group[-1] not in model.parents:

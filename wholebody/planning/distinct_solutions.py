@@ -21,7 +21,7 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 
 FEW = 20  # degrees of freedom up to which starts are so many that the answers they lead to can count as all
-LEAST = 12, 36  # descents before a search counts as complete, of few degrees of freedom and of more
+LEAST = 40  # descents before a search counts as complete; 12 missed minima at limits, which few starts lead to
 SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a branch of a closed form that stands alone
 
 
@@ -111,7 +111,7 @@ def solutions(
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     known: list[Solution] = []
     begun = descents = 0
-    branches, complete, few = _branches(problem), False, problem.scene.model.nv <= FEW
+    branches, complete = _branches(problem), False
     for start in _starts(problem, starts, seed) if branches is None else branches[:starts]:
         left = ends - time.perf_counter()
         if left <= 0.0 and begun:
@@ -123,10 +123,10 @@ def solutions(
         if answer.solved:
             descents += 1
             known = _with(problem, known, answer, apart)
-        complete = all_found(len(known), descents, LEAST[not few]) if branches is None else begun == len(branches)
+        complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
         if complete:
             break
-    complete &= few
+    complete &= problem.scene.model.nv <= FEW
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
 

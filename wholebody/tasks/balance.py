@@ -209,19 +209,19 @@ class SolePolygon(NamedTuple):
         """The same of another point (2,) or (3,) than the centre of mass, with its derivative."""
         points = self._placed(state)
         values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
-        begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
-        if not len(begin):
+        corners = hull_corners(points[:, :2])
+        if not corners:
             return values, rows
-        end = np.roll(begin, -1)
+        begin, end = np.array(corners, dtype=np.intp), np.array([*corners[1:], corners[0]], dtype=np.intp)
         edge, arm = (points[end] - points[begin])[:, :2], center[:2] - points[begin, :2]
-        length = np.hypot(edge[:, 0], edge[:, 1])
-        normals = np.column_stack([-edge[:, 1], edge[:, 0], np.zeros(len(edge))]) / length[:, None]
+        length, normals = np.hypot(edge[:, 0], edge[:, 1]), np.zeros((len(corners), 3))
+        normals[:, 0], normals[:, 1] = -edge[:, 1] / length, edge[:, 0] / length
         share = np.einsum("ij,ij->i", edge, arm) / length**2
         values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
-        rows[begin] = normals[:, :2] @ moves[:2]
-        for corner, part in ((begin, 1.0 - share), (end, share)):
-            wrench = np.hstack([normals, cross(points[corner], normals)])
-            rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
+        both, along = np.concatenate([begin, end]), np.concatenate([normals, normals])
+        wrench = np.concatenate([along, cross(points[both], along)], axis=1)
+        gone = np.append(1.0 - share, share)[:, None] * state.rows(wrench, self.joints[both], np.zeros_like(both))
+        rows[begin] = normals[:, :2] @ moves[:2] - gone[: len(begin)] - gone[len(begin) :]
         return values, rows
 
 

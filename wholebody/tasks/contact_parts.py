@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import coal
 import numpy as np
@@ -38,6 +38,10 @@ class Part(Protocol):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """Values (m,) and their derivative (m, nv)."""
+
+
+Made: TypeAlias = tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]
+"""The parts of a contact term, and the pairs of owners that touch."""
 
 
 class OwnSurface(NamedTuple):

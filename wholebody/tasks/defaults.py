@@ -74,10 +74,12 @@ def default_measures(
     if seated:
         joints = [scene.model.joints[joint] for body in seated for joint in scene.figure.bodies[body]]
         rhythm = rhythm.of_arms({int(joint.idx_v) for joint in joints})
-    # whatever the start is, these are the same
-    stance = [inputs.once(scene, (Stance, pair), partial(Stance(pair).resolve, scene, rest)) for pair in pairs]
-    hang = [inputs.once(scene, (Hang, arms), partial(Hang(arms).resolve, scene, rest)) for arms in (hanging,) if arms]
-    return (_effort.resolve(scene, rest), rhythm, *stance, *hang)
+
+    def kept(kind: type[Stance | Hang], names: tuple[str, ...]) -> Measure:  # whatever the start is, it is the same
+        return inputs.once(scene, (kind, names), lambda: kind(names).resolve(scene, rest))
+
+    free = [kept(Hang, hanging)] if hanging else []
+    return (_effort.resolve(scene, rest), rhythm, *(kept(Stance, pair) for pair in pairs), *free)
 
 
 def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:

@@ -16,8 +16,8 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, face, joined, once_beside, outermost, segments_on, surface
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Made, Near, Over, Part, owner_pairs
+from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, segments_on, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
@@ -68,12 +68,10 @@ class Sit(ContactTerm):
         """Find the surfaces and the seat's face."""
         where, things = f"Sit({shown(self.on)})", [self.on, *filter(None, [self.back])]
         key = Sit, self.on, self.back, self.pelvis, self.trunk, self.erect
-        parts, touches = once_beside(scene, things, where, start, key, partial(self._between, scene, where))
+        parts, touches = once_by(scene, things, where, start, key, partial(self._between, scene, where))
         return filled(self, parts=parts, touches=touches)
 
-    def _between(
-        self, scene: Surroundings, where: str, state: State, rest: State
-    ) -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
+    def _between(self, scene: Surroundings, where: str, state: State, rest: State) -> Made:
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
         seat = face(scene, self.on, UP, state, where)
         thighs = inputs.once(scene, ("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))

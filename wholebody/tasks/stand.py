@@ -18,19 +18,10 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, SolePolygon, polygon
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, TermOfParts, between, owner_pairs, through
+from wholebody.tasks.contact_parts import Facing, Gap, Made, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP
-from wholebody.tasks.surfaces import (
-    Surface,
-    face,
-    joined,
-    once_beside,
-    outermost,
-    segments_beyond,
-    segments_on,
-    surface,
-)
+from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, segments_beyond, segments_on, surface
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
@@ -79,8 +70,7 @@ class Stand(TermOfParts):
         for foot in self.feet:
             inputs.find_place(scene, foot, where)
         key = Stand, self.on, tuple(self.feet), tuple(self.knees), self.balance
-        make = partial(self._between, scene, where)
-        parts, touches = once_beside(scene, [self.on], where, start, key, make)
+        parts, touches = once_by(scene, [self.on], where, start, key, partial(self._between, scene, where))
         keeps, soles = 0.0, parts[-1]
         if isinstance(soles, SolePolygon):
             with scene.figure.posed(start) as state:
@@ -90,9 +80,7 @@ class Stand(TermOfParts):
             keeps = STEADY * polygon(corners).width if self.margin is None else self.margin
         return filled(self, parts=parts, touches=touches, keeps=keeps)
 
-    def _between(
-        self, scene: Surroundings, where: str, state: State, rest: State
-    ) -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
+    def _between(self, scene: Surroundings, where: str, state: State, rest: State) -> Made:
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
         touches: tuple[tuple[str, str], ...] = ()

@@ -109,7 +109,7 @@ def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
     return _of_pieces(scene, name, owned)
 
 
-def once_beside(
+def once_by(
     scene: Surroundings, things: Iterable[str], where: str, start: Array, key: Hashable,
     make: Callable[[State, State], _T],
 ) -> _T:  # fmt: skip

@@ -15,7 +15,7 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Meeting, OwnSurface, Part, owner_pairs
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Made, Meeting, OwnSurface, Part, owner_pairs
 from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
 
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
@@ -67,7 +67,7 @@ class Touch(ContactTerm):
         parts, touches = inputs.once(scene, key, partial(self._between, scene))
         return filled(self, parts=parts, touches=touches)
 
-    def _between(self, scene: Surroundings) -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
+    def _between(self, scene: Surroundings) -> Made:
         where = f"Touch({shown(self.part)}, {shown(self.thing)})"
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)

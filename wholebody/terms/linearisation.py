@@ -137,7 +137,6 @@ class Lineariser:
         self._no_squares = np.zeros((0, self.state.model.nv))
         self._plan = self._planned(self.goals) if plan is None else self._again(plan, self.goals)
         self._own = self._own_terms()
-        self._placed = np.zeros((len(workspace.table.joint), 4, 3))
         self._box, self._measure = np.empty((2, self.state.model.nv)), np.empty((2, self.state.model.nv + 1))
         self._grow(64)
         self._approach = self._largest_approach()
@@ -204,7 +203,7 @@ class Lineariser:
         )  # fmt: skip
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:
-        """What `at` returns, in arrays that the next call overwrites."""
+        """What `at` returns, in arrays that the next question to the workspace overwrites."""
         value, box, measure = self._value, self._box, self._measure
         contacts, count, _ = self._pass(q, within, (value, box, measure, self._no_squares))
         gap, contact, clearance = self._gaps
@@ -230,8 +229,7 @@ class Lineariser:
         written = self._term_wrench, value, self._jacobian, box, measure, squares
         given = self._clearances, self.workspace.rows.arrays, self._rows
         count, gaps, broken = self._kernel.linearise(there, plan[:4], asked, *given, -1, written)
-        self._placed[:] = placed
-        contacts = self._near.contacts(count, self._placed)
+        contacts = self._near.contacts(count, placed)
         if broken:
             near.repair_normals(contacts)
             _, gaps, _ = self._kernel.linearise(there, plan[:4], asked, *given, count, written)
@@ -297,8 +295,7 @@ class Lineariser:
         state = self.state
         for term, evaluate, row, rows in others:
             part, derivative = term.value_and_jacobian(state, evaluate)
-            if np.ndim(part) != 1:
-                part = np.atleast_1d(part)
+            part = np.atleast_1d(part) if np.ndim(part) != 1 else part
             checked_count(term, len(part), rows)
             check_row_count(term, part, derivative, state.model.nv)
             value[row : row + rows] = part

@@ -264,11 +264,11 @@ class Bodies:
             graph.place(path, piece.placement.homogeneous)
             graph.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
 
-    def pose_ghost(self, keyframe: Keyframe, number: int, data: Any) -> None:
-        """Place an existing ghost at the posture of `data`."""
+    def pose_ghost(self, keyframe: Keyframe, data: Any) -> None:
+        """Place the first ghost, which exists, at the posture of `data`."""
         for path, joint in self.carriers.items():
             if joint:
-                keyframe.transforms[f"{LOOK.ghost_node}/{number}{path}"] = data.oMi[joint].homogeneous
+                keyframe.transforms[f"{LOOK.ghost_node}/0{path}"] = data.oMi[joint].homogeneous
 
     def corners(self, data: Any, *, things: bool) -> Array:
         """Corners (n, 3) in the world of boxes around the figure's pieces, or solid things that are no plates."""

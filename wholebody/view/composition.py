@@ -118,7 +118,7 @@ class Composition:
             raise InputError(f"the ghost has {len(checked)} postures and the motion {count}; give as many")
         self.ghosts(checked[:1], color)
         for keyframe, q in zip(keyframes, played.between(self.scene.model, checked), strict=True):
-            self.bodies.pose_ghost(keyframe, 0, self._state.update(q).data)
+            self.bodies.pose_ghost(keyframe, self._state.update(q).data)
         return checked[:1]
 
     def camera(self, postures: Iterable[Array]) -> Command:

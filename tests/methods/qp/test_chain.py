@@ -163,6 +163,24 @@ def test_an_end_inside_of_something_is_rejected(arm):
     assert solution.assessment.measure <= wb.assess(problem, measured.q).measure + 1e-6
 
 
+def test_where_all_ends_of_least_effort_are_blocked_one_of_more_effort_is_found():
+    """Of what reaches into a shelf, ends of least effort come from below, through a board."""
+    rng, reached = np.random.default_rng(3), 0
+    for _ in range(8):
+        problem, _ = robots.into("shelf", 7, rng)
+        met = found(problem, measures=True)
+        if met is None or met.free is None:
+            continue
+        reached += 1
+        np.testing.assert_array_equal(met.begins, [problem.start, met.free])
+        judged = wb.assess(problem, met.free)
+        assert judged.met(1e-6)
+        assert judged.holds(0.0)
+        assert not met.complete
+        assert wb.solve(problem).solved
+    assert reached >= 2
+
+
 def test_a_clearance_that_is_missed_counts_as_something_in_the_way(arm):
     goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
     scene = wb.Scene(arm).add(wb.Sphere(0.02), name="ball", at=tuple(goal + (0.0, 0.0, 0.15)))

@@ -27,7 +27,6 @@ from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.checking import check
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import READERS
-from wholebody.motion.footholds import speeds
 from wholebody.motion.retarget_targets import LIMBS, rest_axes, standing_places
 from wholebody.motion.retargeting import errors_of
 from wholebody.motion.roles import ROWS, Roles, matched
@@ -40,8 +39,9 @@ ABOUT = """\
 Recordings retargeted by `wb.retarget` on the ground that it finds, and by mink frame by frame with the stages, \
 weights and damping of General Motion Retargeting, without contact; there rotations and lengths of limbs come from \
 the rest postures, as here. Both are judged alike: bones by the angle to the recording's, overlaps with the floor \
-and the body itself by `wb.check`, slide as the speed of ankles and toes while those of the recording rest, jerk of \
-all joints' places in parts of the recording's at the same size. Times are the processor's, with the model's set-up."""
+and the body itself by `wb.check`, slide as the speed of ankles and toes from one frame in which those of the \
+recording rest to the next, jerk of all joints' places in parts of the recording's at the same size. Times are the \
+processor's, with the model's set-up."""
 """What the report on `compare` says above its tables."""
 
 ROBOTS, MESHES, SKELETONS = (
@@ -163,7 +163,7 @@ def judged(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Figure
     theirs = motion.positions[:, [motion.names.index(roles.joints[role]) for role in shared]]
     rests = ground(motion, {"skeleton": roles.joints}).rests
     slides = [
-        speeds(ours[:, shared.index(role)], clip.dt)[mask]
+        np.linalg.norm(np.diff(ours[:, shared.index(role)], axis=0), axis=1)[mask[1:] & mask[:-1]] / clip.dt
         for role, mask in rests.items()
         if role in shared and role.endswith(("ankle", "toe"))
     ]

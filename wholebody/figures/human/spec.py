@@ -52,7 +52,7 @@ def human_solids(person: Person, detail: str) -> tuple[Solid, ...]:
 def _links(person: Person) -> tuple[Link, ...]:
     links = []
     for name in ("pelvis", *(row["child_segment"] for row in table("joints"))):
-        if name in keyed("segments", "name"):
+        if name in keyed("segments"):
             x, y, z = (float(value) for value in person.center_of_mass(name))
             ix, iy, iz = (float(value) for value in person.inertia(name))
             links.append(Link(name, person.segment_mass(name), (x, y, z), (ix, iy, iz)))

@@ -37,7 +37,13 @@ class Met(NamedTuple):
     stationary: bool  # whether the measures are stationary too
     # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
+    free: Array | None = None  # (nq,) a posture that does, where q is the start instead, as all ends were blocked
     near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
+
+    @property
+    def begins(self) -> tuple[Array, ...]:
+        """Postures (nq,) from which descents begin, one after the other until one meets everything."""
+        return (self.q,) if self.free is None else (self.q, self.free)
 
     @property
     def complete(self) -> bool:
@@ -154,7 +160,7 @@ class Descents:
             if met is not None:
                 return with_values(met, blocked=None)
             first = None
-        for seeds in self.chain.seeds(self.start, self.settings.seed, self.rule.together):
+        for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if first is None:
                 met = self._along(self._ended(seeds, enough))
             else:
@@ -163,8 +169,15 @@ class Descents:
                 if met is None and not self.control.over:
                     left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
                     met = self._ended(left, enough, others=True)
+            if met is not None and self.rule.measured and not self.measured:
+                return Met(self.asked.at, met.trace, False, free=met.q)
             if met is not None or self.control.over:
                 return met
+            redundant = self.measured and len(self.start) > self.rule.rows
+            if number == SEEDS.weighed and redundant and self.blocked is not None:
+                # Ends of least effort gather at the same places: of others more are free.
+                enough, self.measured = 1, False
+                self.asked = with_values(self.asked, nearest=self.asked.nearest * [[1.0], [0.0]])
         return None
 
     def _branches(self) -> Branches:

@@ -98,7 +98,7 @@ class QP(Settings, Descends):
         if (ending := self._complete(problem, met)) is not None:
             return ending
         search = Multistart(problem, workspace, self._qp_solver(), self, control)
-        begin, before = (None, ()) if met is None else (None if met.complete else met.q, met.trace)
+        begin, before = ((), ()) if met is None else (() if met.complete else met.begins, met.trace)
         best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
         return Ending(
             best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,

@@ -75,12 +75,12 @@ class Multistart:
         return self._best
 
     def run(
-        self, begin: Array | None = None, other: Array | None = None, near: tuple[Array, ...] = ()
+        self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = ()
     ) -> LocalSolution:
-        """The best of attempts from `begin` (nq,) and a descent from `other`; out of reach, the closest to `near`."""
+        """The best of attempts, from `begin` first, and a descent from `other`; out of reach, the closest to `near`."""
         self.out_of_reach = bool(near)
         if not near:
-            self._search(self._attempts(self._start if begin is None else begin))
+            self._search(self._attempts(begin or (self._start,)))
         for q in near:
             self._accept(self._ran(self._closest(), q), self.how)
         if other is not None:
@@ -104,9 +104,9 @@ class Multistart:
                 if enough or self.control.over or self._left < 0 or self._proven():
                     return
 
-    def _attempts(self, begin: Array) -> Iterator[Attempt]:
+    def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt]:
         """The attempts in their order; each is decided on when those before it failed."""
-        yield Attempt([begin], self.directly, "directly")
+        yield Attempt(begin, self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)

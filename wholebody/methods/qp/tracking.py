@@ -206,7 +206,7 @@ class QPTracker(SolvingTracker):
             answer = program.solve(at, measures)
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
-        displacement, following = share * answer.x, None
+        displacement, following = answer.x.copy() if share == 1.0 else share * answer.x, None
         curved = share * motion * (share * answer.turn + TRACKING.off)  # roughly, and rather too much
         if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
@@ -257,7 +257,7 @@ class QPTracker(SolvingTracker):
             groups[rows.contacts - len(short) :] += short
             program = self._program.program
             again = self._working_set.solve(with_values(program, least=program.least + groups[rows.contact]), rows.key)
-            self.workspace.state.update(at.q)  # where motion begins
+            self.workspace.placements(at.q)  # where motion begins
             motion, _ = self._program.turning.motion(at, again.x)
             share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
             displacement = share * again.x
