@@ -96,7 +96,7 @@ def test_a_posture_at_a_limit_that_few_starts_lead_to_is_found(planar_arm: Calla
     problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Point("tip", (*tip, 0.0))])
     assert figure.placement(at(-limit), "tip").translation[:2] == pytest.approx(tip, abs=1e-7)
     found = wb.solutions(problem)
-    assert found.complete
+    assert not found.complete  # two coordinates leave one of the three hinges free
     assert min(np.abs(answer.q - at(-limit)).max() for answer in found) < 1e-4
 
 

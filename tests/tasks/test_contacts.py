@@ -50,6 +50,7 @@ TERMS = {
 OFTEN = {
     **TERMS,
     "on_a_tray": wb.Stand("tray", balance=False),
+    "on_a_step": wb.Stand("step", balance=False),
     "sit_on_a_tray": wb.Sit("tray"),
     "still": wb.Posture("sitting"),
     "comfort": wb.tasks.Discomfort(),
@@ -63,12 +64,15 @@ def test_a_term_is_the_same_whatever_was_stated_before(name: str) -> None:
     figure, rng = wb.load("human", sex="male", stature=1.75), np.random.default_rng(5)
     tray = wb.Box((0.3, 0.2, 0.02))
     used, anew = (_furnished(figure).attach(tray, to="right_palm", name="tray", at=(0.1, 0.0, 0.05)) for _ in range(2))
+    for scene in (used, anew):
+        scene.add(wb.Box((0.5, 0.6, 0.2)), name="step", at=(0.1, 0.0, 0.0))
     start = pin.integrate(figure.model, figure.posture("standing"), 0.2 * rng.normal(size=55))
     OFTEN[name].resolve(used, figure.posture("sitting"))
     for scene in (used, anew):
         for thing, place in (
             ("floor", (0.0, 0.0, 0.05)),
-            ("seat", (-0.3, 0.1, 0.5)),
+            ("seat", (-0.3, 0.1, 0.5, 0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))),
+            ("step", (0.1, 0.2, 0.1, 0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))),
             ("tray", (0.1, 0.0, 0.05, 0.6, 0.0, 0.0, 0.8)),
         ):
             scene.move(thing, at=place)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from typing import overload
@@ -20,9 +20,8 @@ from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-FEW = 20  # degrees of freedom up to which starts are so many that the answers they lead to can count as all
 LEAST = 40  # descents before a search counts as complete; 12 missed minima at limits, which few starts lead to
-SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a branch of a closed form that stands alone
+SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a posture that no neighbour's goals equal
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,9 @@ class Solutions(Sequence[Solution]):
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
         complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof;
-            of an arm of six joints with a closed form, whether all of its branches were descended from; of figures
-            with more than 20 degrees of freedom never.
+            of an arm of six joints with a closed form, whether all of its branches were descended from. Never where
+            neighbours of an answer meet the goals, as those of redundant arms and of people do, and else only after
+            40 descents.
 
     Examples:
         >>> found = wb.solutions(problem, most=2, starts=4)
@@ -126,7 +126,7 @@ def solutions(
         complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
         if complete:
             break
-    complete &= problem.scene.model.nv <= FEW
+    complete = complete and _stand_alone(problem, [answer.q for answer in known])
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
 
@@ -134,12 +134,15 @@ def solutions(
 def _branches(problem: Problem) -> Array | None:
     """The postures (k, nq) of a closed form; None where there is none, or neighbours of one meet the goals."""
     found = closed_form_postures(problem)
+    return found if found is not None and _stand_alone(problem, found) else None
+
+
+def _stand_alone(problem: Problem, postures: Iterable[Array]) -> bool:
+    """Whether the goals fix every joint at these postures (nq,): other answers that meet them are apart."""
     with problem.borrow() as workspace:
         lineariser = problem.lineariser(workspace)
-        for q in () if found is None else found:
-            if np.linalg.svd(lineariser.at(q, 0.0).goal_jacobian, compute_uv=False)[-1] < SINGULAR:
-                return None
-    return found
+        goals = [lineariser.at(q, 0.0).goal_jacobian for q in postures]
+    return all(len(rows) >= rows.shape[1] and np.linalg.svd(rows, compute_uv=False)[-1] >= SINGULAR for rows in goals)
 
 
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:

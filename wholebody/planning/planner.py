@@ -127,13 +127,13 @@ def plan(
         >>> wb.plan(wb.Scene(hand), "open", "grip").solved
         True
     """
-    compile_all(NEEDED)
-    began = _computed()
     checks.instance(scene, Scene, "plan: scene", "make one with wb.Scene(figure)")
     pace = Pace() if pace is None else checks.instance(pace, Pace, "plan: pace", "give wb.planning.Pace(velocity=1.0)")
     limit = checks.number(time_limit, "plan: time_limit", 0.0, np.inf, "s")
     rng = np.random.default_rng(checks.whole(seed, "plan: seed", 0, 2**63 - 1))
     goals = _goals(goal)
+    compile_all(NEEDED)
+    began = _computed()
     with within_budget(max(limit, LEAST)):
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         _check_end(problem, problem.start, "start")

@@ -110,4 +110,7 @@ def _limited(figure: Figure) -> LimitedJoints:
         greatest[mine] = max(float(weights[mine].max(initial=0.0)), LEAST_CURVATURE)
     weights = weights / (greatest * span * span)
     phase = STEEPNESS * np.array([-1.0 / span, 1.0 / span])
-    return LimitedJoints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase)
+    found = LimitedJoints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase)
+    for each in found:
+        each.flags.writeable = False  # every problem of the scene shares them
+    return found

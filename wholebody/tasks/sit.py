@@ -67,7 +67,7 @@ class Sit(ContactTerm):
     def resolve(self, scene: Surroundings, start: Array) -> Sit:
         """Find the surfaces and the seat's face."""
         where, things = f"Sit({shown(self.on)})", [self.on, *filter(None, [self.back])]
-        key = Sit, self.on, self.back, self.pelvis, self.trunk, self.erect
+        key = type(self), self.on, self.back, self.pelvis, self.trunk, self.erect
         parts, touches = once_by(scene, things, where, start, key, partial(self._between, scene, where))
         return filled(self, parts=parts, touches=touches)
 

@@ -69,7 +69,7 @@ class Stand(TermOfParts):
             raise InputError(f"{where}: knees are of the feet, and {some(stray)} is not; give {example}")
         for foot in self.feet:
             inputs.find_place(scene, foot, where)
-        key = Stand, self.on, tuple(self.feet), tuple(self.knees), self.balance
+        key = type(self), self.on, tuple(self.feet), tuple(self.knees), self.balance
         parts, touches = once_by(scene, [self.on], where, start, key, partial(self._between, scene, where))
         keeps, soles = 0.0, parts[-1]
         if isinstance(soles, SolePolygon):

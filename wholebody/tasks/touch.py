@@ -63,7 +63,7 @@ class Touch(ContactTerm):
 
     def resolve(self, scene: Surroundings, start: Array) -> Touch:
         """Find the two surfaces."""
-        key = Touch, self.part, self.thing
+        key = type(self), self.part, self.thing
         parts, touches = inputs.once(scene, key, partial(self._between, scene))
         return filled(self, parts=parts, touches=touches)
 

@@ -187,6 +187,7 @@ def test_the_nearest_place_of_a_chain_is_found_from_far(seed: int) -> None:
     start, system = made.variables(), made.system()
     answer = made.solve(tolerance=1e-7, nearest=True)
     assert answer.status == "solved"
+    assert "not reached" not in answer.message
     # no way along the equations is left: the gradient is a combination of their gradients
     x = made.variables()
     gradient = system.weight * (x - start)
@@ -216,6 +217,7 @@ def test_the_nearest_ring_is_nearer_than_what_least_steps_find() -> None:
     stepped.solve(tolerance=1e-9)
     assert nearest.solve(tolerance=1e-9, nearest=True).status == "solved"
     assert way(nearest, start) < way(stepped, start) - 1e-6
+    assert "not reached" in ring().solve(tolerance=1e-9, nearest=True, iterations=10).message
 
 
 def test_the_nearest_place_keeps_to_limits_and_shapes() -> None:

@@ -206,7 +206,7 @@ class Assembly(AssemblyJoints):
 
         Args:
             tolerance: metres and radians, from 1e-12.
-            iterations: most Newton iterations.
+            iterations: most Newton iterations, and most rounds that look for the nearest placements.
             algebra: "auto", "normal", "kkt" or "schur".
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
@@ -225,9 +225,10 @@ class Assembly(AssemblyJoints):
             found = satisfy(
                 active, start, tolerance=tolerance, iterations=iterations, kind=inequalities, thorough=True,
             )  # fmt: skip
-            x = found.x
+            x, remark = found.x, ""
             if nearest and found.met:
-                x = active.nearest(x, start, tolerance, iterations)
+                x, _, converged = active.nearest(x, start, tolerance, iterations)
+                remark = "" if converged else "; the nearest placements were not reached: give more iterations"
             elif found.met:
                 x = active.lowered(x, tolerance)
             self._places = list(x.reshape(-1, 7))
@@ -246,7 +247,7 @@ class Assembly(AssemblyJoints):
                 penetration=max(0.0, -least),
                 least_distance=least,
                 path=np.array([self._to_scene(state) for state in path]),
-                message=message,
+                message=message + remark,
             )
 
     def prepare(self) -> Self:

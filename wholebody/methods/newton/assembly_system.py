@@ -15,7 +15,7 @@ from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.measures import Objective, refine
+from wholebody.methods.newton.measures import Objective, Refined, refine
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, unit
 from wholebody.scene.scene import Scene
@@ -69,15 +69,15 @@ class AssemblySystem(ActiveSystem):
         def value(here: Array) -> float:
             return objective.value(self._to_scene(here))
 
-        return refine(self, x, value, tolerance=tolerance, rounds=rounds)[0]
+        return refine(self, x, value, tolerance=tolerance, rounds=rounds).x
 
-    def nearest(self, x: Array, anchor: Array, tolerance: float, iterations: int) -> Array:
-        """The place (7 n,) nearest to the anchor, from x, where the equations hold, in so many rounds (eq. 1)."""
+    def nearest(self, x: Array, anchor: Array, tolerance: float, rounds: int) -> Refined:
+        """The place (7 n,) nearest to the anchor, from x, where the equations hold (eq. 1)."""
 
         def value(here: Array) -> float:
             return float(0.5 * (self._weight * (here - anchor)) @ (here - anchor))
 
-        return refine(self, x, value, tolerance=tolerance, rounds=iterations, anchor=anchor)[0]
+        return refine(self, x, value, tolerance=tolerance, rounds=rounds, anchor=anchor)
 
     def _projected(self, x: Array) -> Array:
         x = unit(x)

@@ -16,6 +16,7 @@ a round whose accelerated step does not lower the measures is repeated with the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -154,6 +155,20 @@ def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) 
     return not any(np.abs(measure.gradient(at)[others]).max() > 0.0 for at in states)
 
 
+class Refined(NamedTuple):
+    """Where a descent of measures ended.
+
+    Attributes:
+        x: (7 n,) the variables.
+        iterations: how many Newton iterations it took.
+        converged: whether no further round would lower the measures; False where the rounds ended first.
+    """
+
+    x: Array
+    iterations: int
+    converged: bool
+
+
 def refine(
     active_system: ActiveSystem,
     x: Array,
@@ -162,21 +177,19 @@ def refine(
     tolerance: float,
     rounds: int = REFINEMENT.rounds,
     anchor: Array | None = None,
-) -> tuple[Array, int]:
-    """Lower the measures from x (7 n,), where all equations hold: variables, and the number of iterations.
+) -> Refined:
+    """Lower the measures from x (7 n,), where all equations hold.
 
     With an anchor (7 n,) the measure is the squared motion from there (eq. 1), whose second derivative a step has.
     """
     run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
     run.iterate(REFINEMENT.back, goals=True, measures="keep")
     if not run.met:
-        return x, 0
+        return Refined(x, 0, False)
     run.anchor = anchor
     descent = _Descent(run, measure, tolerance)
-    for _ in range(rounds):
-        if not descent.lower():
-            break
-    return descent.best, len(run.residuals) - 1
+    converged = any(not descent.lower() for _ in range(rounds))
+    return Refined(descent.best, len(run.residuals) - 1, converged)
 
 
 class _Descent:

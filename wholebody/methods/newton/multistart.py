@@ -167,7 +167,7 @@ class Search:
         def value(x: Array) -> float:
             return active_system.objective.value(active_system.bodies.posture(x))
 
-        x, spent = refine(active_system, found.reached.x, value, tolerance=tolerance)
+        x, spent, _ = refine(active_system, found.reached.x, value, tolerance=tolerance)
         self.iterations += spent
         lower = self._judged(with_values(found.reached, x=x), found.how, active_system)
         return lower if self._solves(lower) and self._better(lower, found) else found

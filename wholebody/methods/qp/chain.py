@@ -151,14 +151,13 @@ class Descents:
             # What blocks an end may leave postures of its branch free.
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
             for each in (branches or self._branches()).cheaper(most) if held else ():
-                if not self._is_free(self.chain.posture(each, self.asked.at)):
-                    continue
                 # it is only near to the goals, or was a little beyond limits and clamped to them
                 values = self._beside(float(each[self.chain.held]), each)
                 if values is not None and self._is_free(self.chain.posture(values, self.asked.at)):
                     return self._to_the_edge(values)
             if met is not None:
-                return with_values(met, blocked=None)
+                # What a bent arm misses in its effort, descents of the whole problem find.
+                return met if self.chain.arm is None else with_values(met, blocked=None)
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if first is None:

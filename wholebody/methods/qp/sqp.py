@@ -64,7 +64,8 @@ class SQP(Stage):
             if not self.measures and here.violation.worst <= self.tolerance:
                 converged = self._kept is None
                 break
-            if self._kept is not None and count >= max(self.iterations - LAST, self.iterations / 2):
+            last = count >= max(self.iterations - LAST, self.iterations / 2)
+            if last and self._kept is not None and here.violation.worst > self.tolerance:
                 self.measures = False
             count += 1
             size = StepSize(self._radius, 0.0 if self._full_step else self._pull, self._damping, self.measures)
