@@ -10,7 +10,7 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, ClassVar
@@ -34,6 +34,9 @@ from wholebody.base.errors import WholebodyError
 from wholebody.figures import load
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
+from wholebody.figures.surface import making, surface
+from wholebody.figures.surface.fields import Field
+from wholebody.figures.surface.nets import Triangles, triangles
 from wholebody.scene.scene import Scene
 from wholebody.view import browser, screenshot
 from wholebody.view.browser import Browser
@@ -240,6 +243,28 @@ def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
             patch.setattr(runner, "start_process", _start_warm)
         yield
         batches.close_children()  # one that is left would have the variables and the patches of this module
+
+
+@pytest.fixture(autouse=True, scope="module")
+def coarse_surfaces(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Draw people with triangles twice as large: to make the surface of one takes 1.5 s of the processor, not 0.5.
+
+    A module that is about surfaces sets ``FINE_SURFACES = True``.
+    """
+    fine = getattr(request.module, "FINE_SURFACES", False)
+    with pytest.MonkeyPatch.context() as patch:
+        if fine:
+            patch.setenv("WHOLEBODY_CACHE", str(tmp_path_factory.mktemp("cache")))
+            surface._kept.cache_clear()
+        else:
+            patch.setattr(making, "triangles", _coarse_triangles)
+        yield
+        if fine:
+            surface._kept.cache_clear()
+
+
+def _coarse_triangles(field: Field, low: Any, high: Any, cell: float, cuts: Sequence[Field] = ()) -> Triangles:
+    return triangles(field, low, high, 2.0 * cell, cuts)
 
 
 @pytest.fixture(autouse=True, scope="module")

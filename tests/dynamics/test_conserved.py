@@ -10,6 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.measure.world import ENGINES, Judge, drops
+from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
 
@@ -24,6 +25,16 @@ def still(hand: wb.Figure, *things: tuple[wb.Shape, Any, wb.Body]) -> RigidBodie
     for k, (shape, at, body) in enumerate(things):
         scene.add(shape, name=str(k), at=at, body=body)
     return RigidBodies(scene, gravity=(0.0, 0.0, 0.0))
+
+
+def loses_energy(engine: RigidBodies, frames: int) -> list[EngineFrame]:
+    """Frames of 1/60 s, none of which has more energy than the one before."""
+    made, energy = [], engine.energy()
+    for _ in range(frames):
+        made.append(engine.advance(1 / 60))
+        assert made[-1].energy <= energy + ROUNDING
+        energy = made[-1].energy
+    return made
 
 
 def colliding(rng: np.random.Generator, at: float) -> list[tuple[wb.Shape, Any, wb.Body]]:
@@ -41,15 +52,10 @@ def colliding(rng: np.random.Generator, at: float) -> list[tuple[wb.Shape, Any, 
 @pytest.mark.parametrize("seed", range(2))
 def test_free_collisions_conserve_momentum(hand: wb.Figure, seed: int) -> None:
     engine = still(hand, *colliding(np.random.default_rng(seed), AWAY))
-    momentum, energy, events = engine.momentum(), engine.energy(), 0
-    for _ in range(22):  # until two of them stay together, and are parted by displacements
-        frame = engine.advance(1 / 60)
-        events += len(frame.events)
-        assert frame.energy <= energy + ROUNDING
-        energy = frame.energy
-    assert events > 0
+    momentum = engine.momentum()
+    frames = loses_energy(engine, 22)  # until two of them stay together, and are parted by displacements
+    assert any(frame.events for frame in frames)
     assert engine.momentum() == pytest.approx(momentum, abs=1e-10)
-    assert engine.momentum()[:3] == pytest.approx(momentum[:3], abs=1e-10)
 
 
 def test_one_ball_of_newtons_cradle_leaves_as_fast_as_one_came(hand: wb.Figure) -> None:
@@ -113,13 +119,7 @@ def test_a_heap_never_gains_energy_and_stays_apart(hand: wb.Figure, share: float
             pin.exp3(rng.normal(size=3)), np.array([3.0 + 0.25 * (k % 2), 0.25 * (k // 2 % 2), -1.7 + 0.1 * k])
         )
         scene.add(shape, name=f"thing {k}", at=turned, body=wb.Body(material=stuff))
-    engine = RigidBodies(scene)
-    before = engine.energy()
-    for _ in range(60):
-        frame = engine.advance(1 / 60)
-        assert frame.energy <= before + ROUNDING
-        assert frame.deepest <= 1e-4
-        before = frame.energy
+    assert max(frame.deepest for frame in loses_energy(RigidBodies(scene), 60)) <= 1e-4
 
 
 @pytest.mark.parametrize("name", ["slide", "heap of 20 boxes"])
@@ -222,12 +222,7 @@ def test_a_rod_on_its_tip_ends_though_its_friction_is_painleves(hand: wb.Figure)
     body = wb.Body(mass=1.0, material=rough, velocity=(-3.0, 0.0, 0.0))
     scene.add(wb.Capsule(0.01, 2 * half), name="rod", at=pin.SE3(turned, start), body=body)
     engine = RigidBodies(scene)
-    energy = engine.energy()
-    for _ in range(60):
-        frame = engine.advance(1 / 60)
-        assert frame.energy <= energy + ROUNDING
-        assert frame.deepest <= 1e-4
-        energy = frame.energy
+    assert max(frame.deepest for frame in loses_energy(engine, 60)) <= 1e-4
     assert np.isfinite(engine.twist("rod")).all()
 
 
@@ -237,11 +232,7 @@ def test_a_rattleback_ends(hand: wb.Figure) -> None:
     body = wb.Body(mass=0.1, angular_velocity=(0.0, 0.3, -5.0))
     scene.add(wb.Ellipsoid((0.1, 0.02, 0.01)), name="stone", at=turned, body=body)
     engine = RigidBodies(scene)
-    energy = engine.energy()
-    for _ in range(30):
-        frame = engine.advance(1 / 60)
-        assert frame.energy <= energy + ROUNDING
-        energy = frame.energy
+    loses_energy(engine, 30)
     assert np.isfinite(engine.twist("stone")).all()
 
 

@@ -182,11 +182,10 @@ def test_joint_limits_hold_where_the_original_breaks_them(planar_arm: Callable[.
 
 def test_joints_become_no_faster_than_their_limit_or_the_original(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 20)
-    free = wb.avoid(clip, scene)
-    limit = 0.85 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
+    limit = 1.1 * float(np.abs(np.diff(clip.q, axis=0)).max()) / DT
     found = wb.avoid(clip, scene, constraints=[wb.tasks.StepLimit(limit)])
     assert found.report.solved, found.report.message
-    assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
+    assert np.abs(np.diff(found.clip.q, axis=0)).max() == pytest.approx(limit * DT, abs=1e-6)  # it would be faster
 
 
 def test_progress_is_told_and_ends_it(planar_arm: Callable[..., Figure]) -> None:

@@ -148,34 +148,31 @@ def test_a_box_is_taken_from_the_floor_with_bent_knees(scene: wb.Scene) -> None:
     assert spine < 70.0
 
 
+def taken(scene: wb.Scene, *goals: wb.Goal) -> dict[str, float]:
+    """Angles of the joints, degrees, of a person who stands and meets the goals."""
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    solution = wb.solve(wb.Problem(wb.Scene(scene.figure), goals=goals, constraints=feet))
+    assert solution.status == "solved"
+    return {name: math.degrees(angle) for name, angle in scene.figure.joint_values(solution.q).items()}
+
+
 def test_a_low_reach_bends_the_knees(scene: wb.Scene) -> None:
     """Nobody reaches for something 0.3 m above the floor with straight knees."""
-    goal = wb.Point("right_index_tip", (0.45, -0.20, 0.30))
-    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    solution = wb.solve(wb.Problem(wb.Scene(scene.figure), goals=[goal], constraints=feet))
-    assert solution.status == "solved"
-    angles = scene.figure.joint_values(solution.q)
-    assert min(math.degrees(angles[f"{side}_knee_flexion"]) for side in ("left", "right")) > 15.0
+    angles = taken(scene, wb.Point("right_index_tip", (0.45, -0.20, 0.30)))
+    assert min(angles[f"{side}_knee_flexion"] for side in ("left", "right")) > 15.0
 
 
 def test_an_arm_that_is_raised_sideways_turns_outward_by_itself(scene: wb.Scene) -> None:
     """Without turning it ends at 120 degrees, where the greater tubercle meets the acromion."""
     angle = math.radians(170.0)
     goal = wb.Axis("left_upper_arm", (0, 0, -1), direction=(0.0, math.sin(angle), -math.cos(angle)))
-    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    solution = wb.solve(wb.Problem(wb.Scene(scene.figure), goals=[goal], constraints=feet))
-    assert solution.status == "solved"
-    assert math.degrees(scene.figure.joint_values(solution.q)["left_shoulder_rotation"]) < -10.0
+    assert taken(scene, goal)["left_shoulder_rotation"] < -10.0
 
 
 def test_one_raised_arm_hardly_bends_the_spine_sideways(scene: wb.Scene) -> None:
     """Neither the upper nor the lower thorax moves by more than six degrees in any direction (Stewart et al. 1995)."""
-    goal = wb.Point("right_index_tip", (0.30, -0.25, 2.05))
-    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    solution = wb.solve(wb.Problem(wb.Scene(scene.figure), goals=[goal], constraints=feet))
-    assert solution.status == "solved"
-    angles = scene.figure.joint_values(solution.q)
-    bend = [math.degrees(angles[f"spine{level}_lateral"]) for level in (1, 2, 3, 4)]
+    angles = taken(scene, wb.Point("right_index_tip", (0.30, -0.25, 2.05)))
+    bend = [angles[f"spine{level}_lateral"] for level in (1, 2, 3, 4)]
     assert abs(sum(bend[2:])) < 6.0
     assert abs(sum(bend)) < 9.0  # with the lumbar spine, of which the source says nothing
 
@@ -183,11 +180,8 @@ def test_one_raised_arm_hardly_bends_the_spine_sideways(scene: wb.Scene) -> None
 def test_both_arms_overhead_extend_the_thorax_as_people_do(scene: wb.Scene) -> None:
     """By 12.8 degrees, standard deviation 7.6, on radiographs of 21 men (Edmondston et al. 2012)."""
     goals = [wb.Point(f"{side}_index_tip", (0.15, sign * 0.15, 2.15)) for side, sign in (("left", 1), ("right", -1))]
-    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    solution = wb.solve(wb.Problem(wb.Scene(scene.figure), goals=goals, constraints=feet))
-    assert solution.status == "solved"
-    angles = scene.figure.joint_values(solution.q)
-    thorax = -math.degrees(sum(angles[f"spine{level}_flexion"] for level in (3, 4)))
+    angles = taken(scene, *goals)
+    thorax = -sum(angles[f"spine{level}_flexion"] for level in (3, 4))
     assert 12.8 - 7.6 < thorax < 12.8 + 7.6
 
 

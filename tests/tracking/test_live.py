@@ -15,8 +15,6 @@ from wholebody.methods.ccd.chain import ChainResolver
 from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.tracking.live import LiveDrag
 
-SETTLING = 400
-
 
 @pytest.fixture
 def drag() -> LiveDrag:
@@ -33,9 +31,10 @@ def along(drag: LiveDrag, name: str, way: Any, frames: int = 30) -> Any:
         if frame.path:  # where a thing moved
             assert frame.path[0][1] == pytest.approx(before)
             assert frame.path[-1][1] == pytest.approx(frame.q)
-    for _ in range(SETTLING):  # frames that were slow, as on a busy machine, leave some way
-        if frame.error > (1e-9 if name in drag.things else 1e-3):
-            frame = drag.move(start + np.array(way))
+    stood = 0
+    while stood < 10 and frame.error > (1e-9 if name in drag.things else 1e-3):
+        before, frame = frame, drag.move(start + np.array(way))  # slow frames, as on a busy machine, leave some way
+        stood = 0 if frame.error < before.error - 1e-6 else stood + 1
     drag.let_go()
     return frame
 

@@ -19,6 +19,8 @@ from wholebody.figures.surface.making import Part, person_parts
 from wholebody.figures.surface.person_shape import PersonShape
 from wholebody.geometry.mesh_cache import VARIABLE, cache_state
 
+FINE_SURFACES = True
+
 PEOPLE: dict[str, dict[str, Any]] = {
     "small woman": {"sex": "female", "stature": 1.525, "mass": 51.3},
     "heavy man": {"sex": "male", "stature": 1.87, "mass": 125.0},

@@ -12,6 +12,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.methods.ccd.guards import Kept, guards
+from wholebody.methods.ccd.limbs import Limbs
 
 
 @pytest.fixture(scope="session")
@@ -63,6 +65,39 @@ def _outside(figure: wb.Figure, q: Any) -> float:
 def outside() -> Callable[..., float]:
     """Return a function: figure, posture -> angle out of the reach cones, radians."""
     return _outside
+
+
+@pytest.fixture(scope="session")
+def brought_back(
+    human: wb.Figure, random_joints: Callable[..., Any], outside: Callable[..., float]
+) -> Callable[..., int]:
+    """Return a function: joints, guards, by how much a posture is out [rad], postures -> how many of them were out.
+
+    Limbs start at the neutral posture, take random ones, and are brought back by the guards.
+    """
+
+    def tried(names: Any, kept: Kept, out: Callable[[Any], float], count: int, rng: np.random.Generator) -> int:
+        limbs = Limbs(human.model, map(human.joint_id, names))
+        made, data, left = guards(human, limbs, kept), human.model.createData(), 0
+        for _ in range(count):
+            start, q = human.neutral, random_joints(human, names, rng)
+            pin.forwardKinematics(human.model, data, start)
+            limbs.read(start, data)
+            limbs.forward()
+            for guard in made:
+                guard.read(start, data)
+            pin.forwardKinematics(human.model, data, q)
+            limbs.read(q, data)
+            limbs.forward()
+            left += out(q) > 1e-6
+            assert all(guard.keep() for guard in made)
+            limbs.write(q)
+            assert out(q) <= 1e-9
+            assert outside(human, q) <= 1e-9
+            assert human.within_limits(q)
+        return left
+
+    return tried
 
 
 def _track(figure: wb.Figure, *postures: Any, frames: int = 40) -> list[Any]:

@@ -7,12 +7,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.guards import Kept, guards
-from wholebody.methods.ccd.limbs import Limbs
+from wholebody.methods.ccd.guards import Kept
 
 
 def _left(scene: wb.Scene, q: Any) -> float:
@@ -26,32 +24,12 @@ def _left(scene: wb.Scene, q: Any) -> float:
     [("right_arm", None), ("left_leg", None), ("neck", None), ("left_leg", ("left_hip_flexion", "left_hip_abduction"))],
 )
 def test_what_left_its_range_is_brought_back(
-    chain: str, moving: Any, human: wb.Figure, random_joints: Callable[..., Any], outside: Callable[..., float]
+    chain: str, moving: Any, human: wb.Figure, brought_back: Callable[..., int]
 ) -> None:
     """The last case: joints that stay, a knee, decide with those that move where the range ends."""
-    scene = wb.Scene(human)
+    scene, kept = wb.Scene(human), Kept(ranges=tuple(human.ranges))
     names = human.chains[chain].joints if moving is None else moving
-    limbs = Limbs(human.model, map(human.joint_id, names))
-    made = guards(human, limbs, Kept(ranges=tuple(human.ranges)))
-    data, rng, out = human.model.createData(), np.random.default_rng(5), 0
-    for _ in range(30):
-        start = human.neutral
-        q = random_joints(human, names, rng)
-        pin.forwardKinematics(human.model, data, start)
-        limbs.read(start, data)
-        limbs.forward()
-        for guard in made:
-            guard.read(start, data)
-        pin.forwardKinematics(human.model, data, q)
-        limbs.read(q, data)
-        limbs.forward()
-        out += _left(scene, q) > 1e-6
-        assert all(guard.keep() for guard in made)
-        limbs.write(q)
-        assert _left(scene, q) <= 1e-9
-        assert outside(human, q) <= 1e-9
-        assert human.within_limits(q)
-    assert out > 2
+    assert brought_back(names, kept, lambda q: _left(scene, q), 30, np.random.default_rng(5)) > 2
 
 
 @pytest.mark.parametrize("stated", [False, True])
