@@ -110,8 +110,8 @@ def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(shared_data: Path) -> wb.Clip:
     """The first frames of a man who crouches for a jump."""
-    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 40)
-    return wb.retarget(motion, wb.load("human"))[:25]
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 30)
+    return wb.retarget(motion, wb.load("human"))[:18]
 
 
 def _with_a_ball(recorded: wb.Clip) -> wb.Scene:

@@ -153,7 +153,7 @@ def test_feet_slide_no_more_and_bodies_jerk_no_more_at_higher_rates(
     human: wb.Figure, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(f"{__name__}.DT", 1 / 120)
-    motion, stands = walker.__wrapped__(flat, 1.8)
+    motion, stands = walker.__wrapped__(flat, 1.0)
     clip = wb.retarget(motion, human)
     slid = slides(clip, stands)
     assert slid.mean() < 1e-4
@@ -262,7 +262,7 @@ def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Fi
 
 
 def test_stance_of_a_clip_on_uneven_ground(human: wb.Figure) -> None:
-    motion, stands = walker(rocks, 2.0)
+    motion, stands = walker(rocks, 1.5)
     clip = wb.retarget(motion, human)
     found = standing(human, clip.q, clip.dt)
     for side, mask in stands.items():
