@@ -450,7 +450,7 @@ def test_a_clip_with_a_pack_is_free_in_every_frame(
     module = example("free_a_clip")
     monkeypatch.setenv("WHOLEBODY_DATA", str(tmp_path))
     swing = module.swing
-    module.swing = lambda figure: swing(figure)[:31]  # the example has more to look at
+    module.swing = lambda figure: swing(figure)[:21]  # the example has more to look at
     freed = module.main(out=tmp_path, pictures=False)
     assert freed.report.solved
     assert freed.report.frames_changed > 10

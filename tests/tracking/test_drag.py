@@ -49,7 +49,7 @@ def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callab
     problem = before_plate((0.8, 0.8), 0.55, 1.2)
     scene = problem.scene
     drag = wb.tracking.Drag(problem, method)
-    postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(12)]
+    postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(6)]
     assert drag.to((0.4, -0.2, 1.2)).error < 2e-3
     postures += [drag.to((0.4, y, 1.2)).q for y in np.arange(-0.2, 0.2, 0.04)]
     postures.append(drag.finish().q)

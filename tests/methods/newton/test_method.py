@@ -65,7 +65,7 @@ def test_it_finds_what_the_qp_method_finds(human: wb.Figure) -> None:
 def test_things_in_the_way_are_not_entered(human: wb.Figure, least_distance: Callable[..., float]) -> None:
     scene = wb.Scene(human).add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.75, 0, 0.72))
     problem = _standing(scene, wb.Point("right_index_tip", (0.5, 0.2, 0.8)), clearance=0.005)
-    solution = wb.solve(problem, method="newton")
+    solution = wb.methods.Newton(restarts=0).solve(problem)
     assert solution.solved
     _honest(problem, solution)
     assert least_distance(scene, solution.q) >= problem.clearances.min() - 1e-5
