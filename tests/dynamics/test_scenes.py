@@ -11,7 +11,6 @@ import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_world_scene, standing_scene
 
-
 SHARES = {"bag": 0.35, "dominoes": 0.6, "flick": 0.8, "push_box": 0.4, "stairs": 0.15}
 """Of the frames of a scene, those in which what is to happen happens."""
 
