@@ -798,22 +798,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     )
     cone = {"horizontal": 0.5, "up": 0.5, "down": 0.5, "declination": 0.2}
     yield "FieldOfView", Call(wb.ergonomics.FieldOfView, cone, lambda made: made.off(np.array((1.0, 0.0, 0.0))))
-    yield (
-        "RulaParts",
-        Call(
-            wb.ergonomics.RulaParts,
-            dict.fromkeys(list(wb.ergonomics.RulaParts.__dataclass_fields__), 1),
-            lambda made: made.score,
-        ),
-    )
-    yield (
-        "RebaParts",
-        Call(
-            wb.ergonomics.RebaParts,
-            dict.fromkeys(list(wb.ergonomics.RebaParts.__dataclass_fields__), 1),
-            lambda made: made.score,
-        ),
-    )
+    for parts in (wb.ergonomics.RulaParts, wb.ergonomics.RebaParts):
+        ones = dict.fromkeys(parts.__dataclass_fields__, 1)
+        yield parts.__name__, Call(parts, ones, lambda made: made.score)
     yield "Owas", Call(wb.ergonomics.Owas, {"back": 1, "arms": 1, "legs": 1, "load": 1}, lambda made: made.category)
     record = wb.studies.SolveRecord("a")
     yield (
