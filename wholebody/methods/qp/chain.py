@@ -141,7 +141,7 @@ class Descents:
             met, branches = self._chosen(ends, found), None
             if met is None and not self.control.over:
                 branches = self._branches()
-                others = branches.least[len(ends) :]
+                others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             met = self._along(met)
             if met is None and finite:
