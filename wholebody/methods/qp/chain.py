@@ -38,6 +38,7 @@ class Met(NamedTuple):
     # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
     free: Array | None = None  # (nq,) a posture that does, where q is the start instead, as all ends were blocked
+    through: Array | None = None  # (nq,) the end of least effort that does not keep its clearances, where known
     near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
 
     @property
@@ -169,7 +170,7 @@ class Descents:
                     left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
                     met = self._ended(left, enough, others=True)
             if met is not None and self.rule.measured and not self.measured:
-                return Met(self.asked.at, met.trace, False, free=met.q)
+                return Met(self.asked.at, met.trace, False, free=met.q, through=self.blocked)
             if met is not None or self.control.over:
                 return met
             redundant = self.measured and len(self.start) > self.rule.rows
@@ -247,7 +248,7 @@ class Descents:
                 known = bool(ends[k][2]) and (self.measured or not self.settings.measures)
                 # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
                 free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
-                return Met(q, tuple(self.trace), known, self.blocked if free else None)
+                return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
 
