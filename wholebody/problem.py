@@ -373,8 +373,7 @@ class Problem(checks.FixedAttributes):
         if allowed:
             asked[built.known(("touching", allowed), partial(built.between, allowed))] = 0.0
         if self.clearance > 0.0:  # else no distance that is kept is less
-            key = "resting", self.clearance, built.moves, self._rest.tobytes()
-            number, kept = built.known(key, self._resting)
+            number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
             asked[number] = np.minimum(asked[number], kept)
         return asked
 
