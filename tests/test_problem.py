@@ -170,6 +170,17 @@ def test_clearances_follow_goals_that_were_set(scene):
     assert problem.clearances.tolist() == stated.clearances.tolist()
 
 
+@pytest.mark.parametrize("clearance", [0.0, 0.002, 0.01])
+def test_what_is_nearer_at_the_start_keeps_its_distance(clearance):
+    figure, start = known_arm("ur5")
+    beside = figure.placement(start, "tool").act(np.array([0.0, 0.055, 0.0]))  # 5 mm beyond the end of the last link
+    scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=beside)
+    contacts = scene.contacts(start, within=10.0)
+    asked = wb.Problem(scene, start, clearance=clearance).clearances[contacts.number]
+    assert asked[0] == pytest.approx(min(clearance, 0.005), abs=1e-6)
+    assert (asked[1:] == clearance).all()
+
+
 def test_a_problem_is_tied_to_the_things_it_was_stated_with(scene):
     problem = wb.Problem(scene, goals=[GOAL])
     scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))

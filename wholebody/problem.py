@@ -372,8 +372,8 @@ class Problem(checks.FixedAttributes):
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(built.between, allowed))] = 0.0
-        number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
-        if len(number):
+        if self.clearance > 0.0:  # else no distance that is kept is less
+            number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
             asked[number] = np.minimum(asked[number], kept)
         return asked
 

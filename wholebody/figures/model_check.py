@@ -75,7 +75,7 @@ class Turning:
     def warn(self, q: Array, what: str) -> bool:
         """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
         q = np.asarray(q)
-        if q.ndim == 1 and ((q >= self._least) & (q <= self._most)).all():  # at every step of a tracker
+        if q.ndim == 1 and np.logical_and.reduce((q >= self._least) & (q <= self._most)):  # at every step of a tracker
             return False
         rows = np.atleast_2d(q)
         if not len(rows) or not len(self._places):

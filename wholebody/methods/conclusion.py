@@ -94,9 +94,9 @@ def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool)
 
 
 def _message(problem: Problem, status: Status, judgement: Assessment, ending: Ending, enough: float) -> str:
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
     if status == "solved":
         return f"solved {ending.how}"
+    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
     if ending.failure:
         return f"{ending.failure}: {left}"
     if status == "unreachable":

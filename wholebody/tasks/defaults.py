@@ -38,9 +38,11 @@ def usual_measures(
 
     `stands` are the persons of `standing`.
     """
+    if not scene.figure.ranges:  # no person; to look it up by its start takes longer
+        return (_effort.resolve(scene, start),)
     feet, sits = stances(scene, start, terms), seated(scene, terms)
     arms: tuple[str, ...] = ()
-    if ranges and scene.figure.ranges:
+    if ranges:
         stated = [
             inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))
         ]
@@ -204,7 +206,7 @@ def standing(
 ) -> tuple[str, ...]:
     """The persons who stand, by what the names of each begin with; see `_stands`."""
     figure = scene.figure
-    bodies = [body for body in balancing(scene, terms) if figure.ranges and f"{body}root" in figure.roots]
+    bodies = [body for body in balancing(scene, terms) if f"{body}root" in figure.roots] if figure.ranges else []
     return tuple(body for body in bodies if _stands(scene, start, terms, bounds, body))
 
 

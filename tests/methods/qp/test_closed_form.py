@@ -159,6 +159,26 @@ def test_no_posture_of_seven_joints_that_is_free_takes_less_effort():
     assert np.quantile(least, 0.9) < 1.01
 
 
+def test_no_known_posture_of_a_stretched_arm_takes_much_less_effort():
+    """A closed form that is only near lacks postures of an elbow that is nearly straight, alone and in a batch."""
+    figure, rng = known_arm("gen3")[0], np.random.default_rng(0)
+    scene, start, problems, known = wb.Scene(figure), figure.neutral + 0.3, list[wb.Problem](), list[float]()
+    for _ in range(40):
+        q = rng.uniform(-1.2, 1.2, 7)
+        q[3] = rng.uniform(-0.1, 0.1)
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", figure.placement(q, "tool"))])
+        if (judged := wb.assess(problem, q)).holds(1e-6):
+            problems.append(problem)
+            known.append(judged.measure)
+    assert len(known) > 30
+    answers, batch = [wb.solve(problem) for problem in problems], wb.solve_many(problems, jobs=1)
+    assert all(answer.solved for answer in answers)
+    ratios = np.array([answer.assessment.measure for answer in answers]) / known
+    assert ratios.max() < 1.1
+    for answer, record in zip(answers, batch, strict=True):
+        np.testing.assert_array_equal(answer.q, record.q)
+
+
 def test_goals_that_a_posture_reaches_are_never_proven_out_of_reach():
     """Postures at limits and where axes line up are among them; what is moved away is proven, and no search is made."""
     rng, proven = np.random.default_rng(8), 0

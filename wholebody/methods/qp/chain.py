@@ -38,6 +38,7 @@ class Met(NamedTuple):
     # (nq,) an end of far less effort that does not keep its clearances; None where there is none
     blocked: Array | None = None
     free: Array | None = None  # (nq,) a posture that does, where q is the start instead, as all ends were blocked
+    through: Array | None = None  # (nq,) the end of least effort that does not keep its clearances, where known
     near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
 
     @property
@@ -139,9 +140,11 @@ class Descents:
         if guided:
             ends, found = first or self._first_ended()
             met, branches = self._chosen(ends, found), None
+            if self.rule.lacks(len(ends)):
+                met = self._or_from_random(met)
             if met is None and not self.control.over:
                 branches = self._branches()
-                others = branches.least[len(ends) :]
+                others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             met = self._along(met)
             if met is None and finite:
@@ -169,7 +172,7 @@ class Descents:
                     left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
                     met = self._ended(left, enough, others=True)
             if met is not None and self.rule.measured and not self.measured:
-                return Met(self.asked.at, met.trace, False, free=met.q)
+                return Met(self.asked.at, met.trace, False, free=met.q, through=self.blocked)
             if met is not None or self.control.over:
                 return met
             redundant = self.measured and len(self.start) > self.rule.rows
@@ -178,6 +181,14 @@ class Descents:
                 enough, self.measured = 1, False
                 self.asked = with_values(self.asked, nearest=self.asked.nearest * [[1.0], [0.0]])
         return None
+
+    def _or_from_random(self, met: Met | None) -> Met | None:
+        """An end, or one of less effort from the first random seeds."""
+        seeds = next(self.chain.seeds(self.start, self.settings.seed, self.rule.together))
+        other = self._ended(seeds, self.rule.enough)
+        if met is None or (other is not None and self._effort(other.q) < self._effort(met.q)):
+            return other
+        return with_values(met, trace=tuple(self.trace))
 
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
@@ -247,7 +258,7 @@ class Descents:
                 known = bool(ends[k][2]) and (self.measured or not self.settings.measures)
                 # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
                 free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
-                return Met(q, tuple(self.trace), known, self.blocked if free else None)
+                return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
 
@@ -311,6 +322,11 @@ class Rule(NamedTuple):
     rows: int  # of the goals
     together: int  # seeds of a batch of random ones
     measured: bool  # whether ends are compared by a measure
+    nearly: bool  # whether the closed form is only near to postures, and lacks some of an arm that is stretched
+
+    def lacks(self, count: int) -> bool:
+        """Whether so many ends of a closed form are too few to compare."""
+        return self.nearly and count < self.enough
 
     @classmethod
     def of(cls, chain: PlainChain, goals: Goals, settings: Settings, measured: bool) -> Rule:
@@ -318,9 +334,10 @@ class Rule(NamedTuple):
         guided, more = chain.is_guided(goals), 1 + settings.restarts_for_measure
         held = guided and chain.held >= 0
         finite = guided and not held and chain.arm is not None
-        enough = 1 if finite or not measured else SEEDS.compared * more
+        enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
         rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)
-        return cls(guided, held, finite, enough, rows, SEEDS.together * more, measured)
+        nearly = guided and chain.first > 0 and measured
+        return cls(guided, held, finite, enough, rows, SEEDS.together * more, measured, nearly)
 
 
 def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:

@@ -194,6 +194,7 @@ class _First:
         """Postures (k, nq) at ends of least effort, descents (k,), and whether (k,) goals are met there for good."""
         rows, least = np.arange(len(self.at)), self.order[:, 0]
         ended = (self.effort[rows, least] < np.inf) & (self.known[rows, least, 2] != 0.0)
+        ended &= ~np.array([self.rule.lacks(count) for count in self.counts.tolist()], dtype=bool)
         q = self.at.copy()
         q[ended] = self.postures(np.flatnonzero(ended), 0)
         counted = (np.arange(self.known.shape[1]) < self.counts[:, None]) & (self.known[:, :, 3] != 0.0)

@@ -356,7 +356,7 @@ def reach_all(
     bodies: tuple[Chain, Arm, Room], asked: Array, goals: tuple[Array, NDArray[np.int64]], samples: tuple[int, int],
     nearest: Array, ends: Array, found: Array, counts: Indices,
 ) -> None:  # fmt: skip
-    """Do for each of k problems what `reach` does, from the branches of its closed form or given seeds.
+    """Do for each of k problems what `reach` does, from given seeds and then the branches of its closed form.
 
     Args:
         bodies: the joints; the arm that they are, without joints where it has no closed form; room, written.
@@ -364,31 +364,35 @@ def reach_all(
         goals: floats (k, e, 36) and integers (e, 6) of the goals.
         samples: how many of the joint that the closed form holds, and how many where none of these is within limits.
         nearest: (k, 2, n) as in `reach`.
-        ends: (k, m, n) seeds of arms without a closed form; written: where descents end.
+        ends: (k, m, n) the given seeds; written: where descents end.
         found: (k, m, 4) written, as in `reach`.
-        counts: (k,) of seeds; written: of those that were taken, -1 for more than there is room for.
+        counts: (k,) of given seeds; written: of those that were taken, -1 for more than there is room for.
     """
     chain, arm, room = bodies
     tables, integers = goals
     size, most, limits = len(chain.lower), ends.shape[1], (chain.lower, chain.upper)
     branch, effort = np.empty((samples[1], BRANCHES, size)), np.empty((samples[1], BRANCHES))
-    order, seeds = np.empty(samples[1] * BRANCHES, dtype=np.intp), np.empty((samples[1] * BRANCHES, size))
-    met, expected = np.empty((samples[1] * BRANCHES, 4)), np.zeros(max(most, samples[1] * BRANCHES))
+    every = most + samples[1] * BRANCHES
+    order, seeds = np.empty(samples[1] * BRANCHES, dtype=np.intp), np.empty((every, size))
+    met, expected = np.empty((every, 4)), np.zeros(every)
     for p in range(len(tables)):
         one = Goals(tables[p], integers)
         if not len(arm.joints):
             given = ends[p, : counts[p]]
             counts[p] = reach(chain, one, room, given, nearest[p], asked, expected, found[p])
             continue
-        number = 0
+        first, number = counts[p], 0
+        for k in range(first):
+            copy(ends[p, k], seeds[k])
+            expected[k] = 0.0
         for v in samples:
             if number == 0:
                 number = sampled(arm, tables[p, 0], limits, nearest[p], branch[:v], effort[:v], order)
                 for k in range(number):
                     at, b = order[k] // BRANCHES, order[k] % BRANCHES
-                    copy(branch[at, b], seeds[k])
-                    expected[k] = foreseen(effort[:v], at, b)
-        taken = reach(chain, one, room, seeds[:number], nearest[p], asked, expected, met)
+                    copy(branch[at, b], seeds[first + k])
+                    expected[first + k] = foreseen(effort[:v], at, b)
+        taken = reach(chain, one, room, seeds[: first + number], nearest[p], asked, expected, met)
         counts[p] = taken if taken <= most else -1
         for k in range(min(taken, most)):
             copy(seeds[k], ends[p, k])

@@ -99,7 +99,8 @@ class QP(Settings, Descends):
             return ending
         search = Multistart(problem, workspace, self._qp_solver(), self, control)
         begin, before = ((), ()) if met is None else (() if met.complete else met.begins, met.trace)
-        best = search.run(begin, None if met is None else met.blocked, () if met is None else met.near)
+        known = () if met is None else (met.blocked, met.near, _measure(problem, workspace, met.through))
+        best = search.run(begin, *known)
         return Ending(
             best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
             contradictions=search.contradictions, programs=search.solver.counted(),
@@ -158,3 +159,11 @@ class QP(Settings, Descends):
             InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
         return QPTracker(problem, self._qp_solver(), dt, self, lambda: replace(self, measures=True))
+
+
+def _measure(problem: Problem, workspace: Workspace, q: Array | None) -> float:
+    """The weighted sum of the measures at a posture (nq,); 0 without one."""
+    if q is None:
+        return 0.0
+    state = workspace.state.update(q)
+    return sum((term.weight * term.value(state) for term in problem.measures), 0.0)

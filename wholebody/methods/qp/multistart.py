@@ -51,15 +51,15 @@ class Multistart:
         self.trace: list[TraceEntry] = []
         self._shared = Run(self.subproblem, self.lineariser, solver, self.trace, control)
         self.spent = self.tried = 0  # iterations, and starts of attempts
-        self.how = "directly"
-        self.contradictions: tuple[Contradiction, ...] = ()
+        self.how, self.contradictions = "directly", tuple[Contradiction, ...]()
         self._start = problem.scene.figure.clamp(problem.start)
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
-        self._nearest_through = np.inf  # least violation of a relaxed probe: so near come the goals, if through things
+        # Through things: least violation of a relaxed probe, so near come the goals, and measures where they are met.
+        self._nearest_through, self._through_measure = np.inf, 0.0
         self.out_of_reach = False  # as it seems
         self._best: LocalSolution | None = None
 
@@ -75,10 +75,11 @@ class Multistart:
         return self._best
 
     def run(
-        self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = ()
-    ) -> LocalSolution:
+        self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = (), least: float = 0
+    ) -> LocalSolution:  # fmt: skip
         """The best of attempts, from `begin` first, and a descent from `other`; out of reach, the closest to `near`."""
-        self.out_of_reach = bool(near)
+        # `least`: measures where the goals are known to be met, if through things; 0 where nothing is known
+        self.out_of_reach, self._through_measure = bool(near), least
         if not near:
             self._search(self._attempts(begin or (self._start,)))
         for q in near:
@@ -204,10 +205,9 @@ class Multistart:
 
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
-        tolerance = self.settings.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
         self._nearest_through = min(self._nearest_through, relaxed.violation.total)
-        if relaxed.violation.worst > SEARCH.reached * tolerance:
+        if relaxed.violation.worst > SEARCH.reached * self.settings.tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
         return self._free(relaxed.q, start)
@@ -229,8 +229,8 @@ class Multistart:
         there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
         if there is None or self.control.over:
             return False
-        tolerance, workspace, before = self.settings.tolerance, self.lineariser.workspace, self.best.measure
-        search = Multistart(there, workspace, self.solver, self.settings, self.control)
+        tolerance, before = self.settings.tolerance, self.best.measure
+        search = Multistart(there, self.lineariser.workspace, self.solver, self.settings, self.control)
         local = search.directly(self._start)
         if local.violation.worst > tolerance:
             local = search.feasibility_first(self._start) or local
@@ -269,7 +269,7 @@ class Multistart:
         if count:
             rng = np.random.default_rng([self.settings.seed, count])
             return chain([here], restarts(self.problem, self.lineariser.state, here, rng, SEARCH.screened * count - 1))
-        if not self.settings.restarts:
+        if not self.settings.restarts or self.best.measure <= SEARCH.dear * self._through_measure:
             return []
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         through = self._ran(SQP(alone, tolerance, most, "through things"), self.best.q)
@@ -333,7 +333,7 @@ class Multistart:
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
-        given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed))
+        given = self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed)
         agreeing = SEARCH.agreeing_few if (few := moving(self._shared, self.best.q) < SEARCH.few) else SEARCH.agreeing
         starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
         starts = chain([q], self.lineariser.defined(starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)))
@@ -359,8 +359,7 @@ class Multistart:
         return min(programs, self.settings.iterations)
 
     def _closest(self) -> Closest:
-        most = self._at_most(SEARCH.coming_near)
-        return Closest(self._shared, self.settings.tolerance, most, problem=self.problem)
+        return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""

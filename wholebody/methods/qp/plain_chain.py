@@ -38,6 +38,7 @@ class PlainChain:
         guide: the same, or an arm that they nearly are.
         held: the joint that the closed form of the guide holds; -1 for none.
         samples: how many values of it are looked at, and how many where none of these is within limits.
+        first: how many seeds come before its branches: the posture of least effort, where the closed form is not exact.
     """
 
     def __init__(self, model: pin.Model, limits: Limits, joints: tuple[int, ...]) -> None:
@@ -68,6 +69,7 @@ class PlainChain:
         self.guide = self.arm or closed_form(self.chain, NEARLY)
         self.held = -1 if self.guide is None or self.guide.held < 0 else int(self.guide.joints[self.guide.held])
         self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
+        self.first = int(self.arm is None and self.guide is not None)  # it lacks postures of an arm that is stretched
 
     def angles(self, q: Array) -> Array:
         """Values (..., n) of the joints at postures (..., nq)."""
@@ -177,6 +179,8 @@ class PlainChain:
         room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
         found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
         arm = _NO_ARM if seeds or self.guide is None else self.guide
+        if self.first and not seeds:
+            ends[:, 0], counts[:] = np.clip(nearest[:, 0], self.chain.lower, self.chain.upper), self.first
         compiled_kernel().reach_all(
             (self.chain, arm, room), asked, (tables, goals.entries), self.samples, nearest, ends, found, counts
         )
