@@ -102,7 +102,6 @@ class PairTable:
         joint: (n,) joint that carries each piece; 0 is the world.
         reach: (n,) radius of each piece about its origin, metres; infinite for a half-space.
         half: (n, 3) half the size of a box about each piece's origin, along its own axes, metres.
-        plane: (n, 4) row [n, b] of a half-space, n . x <= b in its own axes; zero for everything else.
         widths: (pairs,) width of both pieces together, metres.
         points: (m, 3) swept points of all pieces, one piece after the other, each in its piece's frame.
         first_point: (n + 1,) where those of each piece begin.
@@ -128,8 +127,6 @@ class PairTable:
         self.joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
         self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
-        flat = [swept.faces[0] if np.isinf(swept.reach) else np.zeros(4) for swept in self.swept]
-        self.plane = np.array(flat).reshape(-1, 4)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         first, second = self.pairs.T
         self.widths: Array = width[first] + width[second]
@@ -176,7 +173,7 @@ class Proximity:
         self._bound = np.array([self._endless, table.points_meet])
         self._placed, self._buffer = np.zeros((count, 4, 3)), ContactBuffer(64)
         self._looked = (
-            table.pairs, table.reach, table.half, table.plane, np.zeros((count, 4, 3)), self._travelled, self._bound,
+            table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
             np.zeros((count, 3)), marks,
         )  # fmt: skip
         self.known = table.pairs, self._travelled, self._bound
@@ -297,7 +294,7 @@ def compiled_kernel(proximity_kernel: Any) -> None:
     placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
     index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     lines, bound, marks = np.zeros((1, 3)), np.zeros((2, 0)), np.zeros((3, 0), dtype=np.intp)
-    known = pairs, one, lines, np.zeros((1, 4)), placement.copy(), one.copy(), bound, lines, marks
+    known = pairs, one, lines, placement.copy(), one.copy(), bound, lines, marks
     proximity_kernel.look(placement, known, 0.0, none, 0)
     room = none, np.zeros((3, 0, 3)), index, pairs
     results = np.zeros((0, RESULT_DOUBLES))

@@ -13,10 +13,8 @@ from wholebody.geometry.pieces import COAL_ACCURACY
 @compiled(inner=True)
 def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> None:
     """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last` (n, 4, 3)."""
-    # A point x moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm; one of a half-space by any way.
+    # A point x moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm.
     for i in range(len(reach)):
-        if reach[i] == np.inf:
-            continue
         shift = 0.0
         turn = 0.0
         for k in range(3):
@@ -55,19 +53,6 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
         boxes = max(boxes, apart - extent[a, k] - extent[b, k])
     gap: float = max(boxes, np.sqrt(square) - reach[a] - reach[b])
     return gap
-
-
-@compiled(inner=True)
-def height_above(placement: Array, plane: Array, extent: Array, reach: float, half_space: int, piece: int) -> float:
-    """A lower bound of a piece's signed distance to a half-space, with `plane` (4,) [n, b] in its own axes."""
-    height, box = -plane[3], 0.0
-    for k in range(3):
-        normal = 0.0
-        for j in range(3):
-            normal += placement[half_space, j, k] * plane[j]
-        height += normal * (placement[piece, 3, k] - placement[half_space, 3, k])
-        box += abs(normal) * extent[piece, k]
-    return height - min(reach, box)
 
 
 @compiled()
@@ -149,20 +134,19 @@ def renew(marked: Indices, before: int, index: Indices, count: int, changed: Ind
 
 @compiled()
 def look(
-    placement: Array, known: tuple[Indices, Array, Array, Array, Array, Array, Array, Array, Indices], within: float,
+    placement: Array, known: tuple[Indices, Array, Array, Array, Array, Array, Array, Indices], within: float,
     most: Array, before: int,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `marks[0]`.
 
     A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
     was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
-    between boxes along the world's axes about them, of which one may be a half-space. All three bound the distance in
-    penetration too.
+    between boxes along the world's axes about them. All three bound the distance in penetration too.
 
     Args:
         placement: (n, 4, 3) where the pieces are; see `Contacts.placements`.
-        known: `pairs`, `reach`, `half` and `plane` of the pair table; `last` (n, 4, 3), where the pieces were when this
-            was asked last; `travelled` (n,), how far each can have moved since the beginning, see `travel`; `bound`
+        known: `pairs`, `reach` and `half` of the pair table; `last` (n, 4, 3), where the pieces were when this was
+            asked last; `travelled` (n,), how far each can have moved since the beginning, see `travel`; `bound`
             (2, pairs), a lower bound of the distance when a pair was last looked at, plus what both had travelled
             then, and the distance at and below which coal may have no normal; room (n, 3) for the sizes of the boxes;
             `marks` (3, pairs), room for the answer, the pairs of the last one, and those that differ, see `renew`.
@@ -173,7 +157,7 @@ def look(
     Returns:
         How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
-    pairs, reach, half, plane, last, travelled, bound, extent, marks = known
+    pairs, reach, half, last, travelled, bound, extent, marks = known
     index = marks[0]
     travel(placement, last, reach, travelled)
     bound_by_boxes(placement, half, extent)
@@ -182,14 +166,9 @@ def look(
         a, b = pairs[p, 0], pairs[p, 1]
         way = travelled[a] + travelled[b]
         near = min(within, most[p])
-        if reach[a] == np.inf:
-            gap = height_above(placement, plane[a], extent, reach[b], a, b)
-        elif reach[b] == np.inf:
-            gap = height_above(placement, plane[b], extent, reach[a], b, a)
-        elif bound[0, p] - way >= near:
+        if bound[0, p] - way >= near:
             continue
-        else:
-            gap = outer_gap(placement, reach, extent, a, b)
+        gap = outer_gap(placement, reach, extent, a, b)
         if gap >= near:
             bound[0, p] = gap + way
             continue
