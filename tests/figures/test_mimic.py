@@ -197,3 +197,27 @@ def test_a_pickled_scene_moves_as_before(load: Callable[..., wb.Figure], content
         for one, two in zip(data.oMi, there.oMi, strict=True):
             assert np.array_equal(one.homogeneous, two.homogeneous)
     assert np.array_equal(other.velocityLimit, model.velocityLimit)
+
+
+def test_axes_of_joints_beside_followers_are_their_own(load: Callable[..., wb.Figure]) -> None:
+    """Columns of Pinocchio's Jacobians have places for followers too, which degrees of freedom have not."""
+    figure = load(
+        text(
+            joint("left_a", "a", "b", axis="0 0 1"),
+            joint("left_b", "b", "c", follow("left_a"), axis="0 1 0"),
+            joint("right_a", "a", "d", axis="0 0 1"),
+            joint("right_b", "d", "e", follow("right_a"), axis="0 1 0"),
+        )
+    )
+    assert wb.Clip(figure, [[0.3, 0.5]], 0.1).mirrored().q == pytest.approx(np.array([[-0.5, -0.3]]))
+    arm = load(
+        text(
+            joint("a_finger", "a", "b", axis="1 0 0"),
+            joint("b_finger", "b", "c", follow("a_finger"), axis="1 0 0"),
+            joint("hand", "a", "d", axis="0 1 0"),
+            joint("nail", "d", "e"),
+        )
+    )
+    table = wb.figures.denavit_hartenberg(arm, "e")
+    q = arm.with_joints(arm.neutral, {"hand": 0.4, "nail": -0.7})
+    assert table.forward([0.4, -0.7]).homogeneous == pytest.approx(arm.placement(q, "e").homogeneous, abs=1e-12)

@@ -160,6 +160,22 @@ def test_a_robot_with_long_fingers_has_its_elbows_before_its_wrists(tmp_path: Pa
     assert found == {"pelvis": "base"} | {f"left_{part}": f"left_{joint}_j" for part, joint in parts}
 
 
+def test_a_hand_that_rolls_about_the_forearm_begins_at_the_wrist(tmp_path: Path) -> None:
+    """As of an H1 with hands: that joint alone is between elbow and fingers, and named after the hand."""
+    links = [("base", "torso", (0, 0, 0.4), 0.3, "z")]
+    for side, sign in (("left", 1), ("right", -1)):
+        hand = f"{side}_hand"
+        links += [
+            ("base", f"{side}_a", (0, 0.1 * sign, -0.1), 0.1, "y"), (f"{side}_a", f"{side}_b", (0, 0, -0.4), 0.1, "y"),
+            (f"{side}_b", f"{side}_c", (0, 0, -0.4), 0.1, "y"), ("torso", f"{side}_d", (0, 0.2 * sign, 0.1), 0.05, "y"),
+            (f"{side}_d", f"{side}_e", (0, 0, -0.3), 0.05, "y"), (f"{side}_e", hand, (0, 0, -0.25), 0.05, "z"),
+            *((hand, f"{side}_{end}", (x, 0, -0.13), 0.02, "y") for end, x in (("g", -0.02), ("h", 0.02))),
+        ]  # fmt: skip
+    found = matched(still(tuple(KNOWN["SMPL-X"].split())), robot(tmp_path, links), None).frames
+    assert (found["left_elbow"], found["left_wrist"]) == ("left_e_j", "left_hand_j")
+    assert "left_hand" not in found
+
+
 @pytest.mark.parametrize("ahead", [1, -1])
 def test_a_small_robot_with_a_stiff_trunk_is_known_by_its_axes(ahead: int, tmp_path: Path) -> None:
     """Numbered joints, of which the third of a leg turns it far below the hip; no wrists; some look backward."""

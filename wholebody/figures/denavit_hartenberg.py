@@ -100,7 +100,7 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
     parent = model.parents[ids[0]]
     reference = _link_frame(figure, parent)
     inverse = (data.oMf[reference[1]] if reference[1] >= 0 else pin.SE3.Identity()).inverse()
-    directions = data.J[3:, [model.joints[joint].idx_v for joint in ids]].T @ inverse.rotation.T
+    directions = data.J[3:, [model.joints[joint].idx_vExtended for joint in ids]].T @ inverse.rotation.T
     axes = [(inverse.act(data.oMi[joint].translation), axis) for joint, axis in zip(ids, directions, strict=True)]
     tip = inverse * data.oMf[tip_id]
     frames = _frames(axes)

@@ -71,7 +71,7 @@ def _exchange(figure: Figure) -> tuple[Indices, Array]:
         apart = np.linalg.norm(here - data.oMi[other.id].translation)
         if apart > 0.01:  # m: robot descriptions have rounded digits
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} are not symmetric to y = 0")
-        along = _along(data.J[:, joint.idx_v], data.J[:, other.idx_v])
+        along = _along(data.J[:, joint.idx_vExtended], data.J[:, other.idx_vExtended])
         if abs(along) < np.cos(0.05):
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} turn about other axes")
         for k in range(joint.nq):  # an unlimited joint has cosine and sine; only the sine changes its sign

@@ -164,7 +164,9 @@ def figure_roles(figure: Figure) -> dict[str, str]:
             found[f"{side}_{part}"] = joint
     # one name alone tells no limb: RR_hip_joint is of the rear legs of a quadruped
     found = {role: joint for role, joint in found.items() if _limb_of(role) & found.keys() - {role}}
-    found |= built_figure(figure)  # where its links are says more than names: a yaw of a shoulder may be at the elbow
+    # where its links are says more than names: a yaw of a shoulder may be at the elbow, and a hand be the wrist
+    structure = built_figure(figure)
+    found = {role: joint for role, joint in found.items() if joint not in structure.values()} | structure
     if figure.root == "free":
         links = (*figure.segments, *figure.frames)  # a root link without a shape is no segment
         found["pelvis"] = next(name for name in links if figure.model.frames[figure.frame_id(name)].parentJoint == 1)

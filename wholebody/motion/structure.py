@@ -190,7 +190,9 @@ def built_figure(figure: Figure) -> dict[str, str]:
     for joint in range(root + 1, model.njoints):
         before, columns = model.parents[joint], model.joints[joint]
         own, way = first[before], at[before] - at[joint]
-        axis = axes[:, columns.idx_v] if columns.nv == 1 else np.zeros(3)  # none of what slides
+        # none of what slides; fingers begin at a wrist, which is where it is
+        hinge = columns.nv == 1 and list(model.parents).count(joint) < 2
+        axis = axes[:, columns.idx_vExtended] if hinge else np.zeros(3)
         along = (axis @ way) * axis
         if own and list(model.parents).count(before) == 1 and np.linalg.norm(way - along) < near:
             groups[own].append(joint)
