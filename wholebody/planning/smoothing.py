@@ -82,7 +82,7 @@ def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
 
 def _unwrapped(motions: Array) -> Array:
     """Motions (n, 6) or turns (n, 3) as other logarithms, so that turns go on beyond pi in place of jumping back."""
-    found = motions.copy()
+    found: Array = motions.copy()
     for k in range(1, len(found)):
         turn, before = found[k, -3:], found[k - 1, -3:]
         angle = float(np.linalg.norm(turn))
