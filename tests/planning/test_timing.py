@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.optimize import linprog
 
 import wholebody as wb
+from wholebody.planning.smoothing import places
 from wholebody.planning.timing import Pace, Timing, squared_rates, used
 
 
@@ -56,3 +58,19 @@ def test_frames_of_a_path_with_a_corner_keep_the_limits(planar_arm: Callable[...
     speed = np.diff(q, axis=0) / pace.dt
     assert np.abs(speed).max() <= 3.0 * 1.001
     assert np.abs(np.diff(speed, axis=0)).max() / pace.dt <= 8.0 * 1.001
+
+
+def test_what_turns_freely_goes_on_beyond_half_a_turn() -> None:
+    model = pin.Model()
+    root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    model.addJoint(root, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+    axis, path = np.array((0.6, 0.0, 0.8)), []
+    for angle in np.linspace(0.0, 4.5, 60):
+        turn = pin.Quaternion(pin.exp3(angle * axis)).coeffs()
+        path.append(np.concatenate([(0.1 * angle, -0.2, 0.3), turn, pin.Quaternion(pin.exp3(-angle * axis)).coeffs()]))
+    found = places(model, path)
+    assert np.abs(np.diff(found, axis=0)).max() < 0.25  # no jump: each step turns by 0.08 rad
+    assert np.linalg.norm(found[-1, 3:6]) == pytest.approx(4.5)
+    assert found[-1, 6:] == pytest.approx(-4.5 * axis)
+    for q, place in zip(path, found, strict=True):
+        assert np.abs(pin.difference(model, pin.integrate(model, path[0], place), q)).max() < 1e-9

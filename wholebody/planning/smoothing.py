@@ -69,10 +69,31 @@ def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
 
 
 def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
-    """(n, nv) differences of postures (n, nq) from the first; joints that turn without limits go on beyond pi."""
+    """(n, nv) differences of postures (n, nq) from the first; what turns without limits goes on beyond pi."""
     found = np.array([pin.difference(model, path[0], q) for q in path])
-    turning = [joint.idx_v for joint in model.joints[1:] if (joint.nq, joint.nv) == (2, 1)]
-    found[:, turning] = np.unwrap(found[:, turning], axis=0)
+    for joint in model.joints[1:]:
+        own = found[:, joint.idx_v : joint.idx_v + joint.nv]
+        if (joint.nq, joint.nv) == (2, 1):
+            own[:] = np.unwrap(own, axis=0)
+        elif (joint.nq, joint.nv) in ((7, 6), (4, 3)):  # free bodies and balls
+            own[:] = _unwrapped(own)
+    return found
+
+
+def _unwrapped(motions: Array) -> Array:
+    """Motions (n, 6) or turns (n, 3) as other logarithms, so that turns go on beyond pi in place of jumping back."""
+    found: Array = motions.copy()
+    for k in range(1, len(found)):
+        turn, before = found[k, -3:], found[k - 1, -3:]
+        angle = float(np.linalg.norm(turn))
+        if angle < 1e-6:
+            continue
+        whole = 2.0 * np.pi * np.round((before @ turn / angle - angle) / (2.0 * np.pi))
+        if whole:
+            away = pin.exp6(found[k]).translation if len(found[k]) == 6 else None
+            found[k, -3:] = (1.0 + whole / angle) * turn
+            if away is not None:
+                found[k, :3] = np.linalg.solve(pin.Jexp3(-found[k, -3:]), away)
     return found
 
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.methods.base import UnsupportedTermError
 
 
@@ -46,6 +47,23 @@ def test_two_figures_meet_half_way(human: wb.Figure) -> None:
     assert solution.status == "solved"
     ends = [pair.figure.placement(solution.q, f"{name}/right_palm") for name in ("anna", "ben")]
     assert ends[1].actInv(ends[0].translation) == pytest.approx((0.0, 0.0, 0.06), abs=1.1e-4)
+
+
+def test_two_arms_that_hold_one_bar_keep_it_where_it_is_in_both() -> None:
+    arm, ready = known_arm("ur5")
+    scene = wb.Scene({"left": arm, "right": (arm, (0.9, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0))})
+    start = scene.figure.posture({"left": ready, "right": ready})
+    tool = scene.figure.placement(start, "left/tool")
+    held, between = wb.Hold("right/tool", relative_to="left/tool"), []
+    for moved, status in (((0.0, 0.06, 0.05), "solved"), ((0.9, 0.0, 0.9), "unreachable")):
+        goal = wb.Frame("left/tool", pin.SE3(tool.rotation, tool.translation + moved))
+        solution = wb.solve(wb.Problem(scene, start, goals=[goal], constraints=[held]), "ccd")
+        assert solution.status == status, solution
+        ends = [scene.figure.placement(solution.q, f"{side}/tool") for side in ("left", "right")]
+        between.append(ends[0].actInv(ends[1]).homogeneous)
+        assert (np.linalg.norm(ends[0].translation - tool.translation - moved) < 1e-4) == (status == "solved")
+    apart = tool.actInv(scene.figure.placement(start, "right/tool")).homogeneous
+    assert np.abs(np.array(between) - apart).max() < 2e-4
 
 
 def test_a_hand_at_a_point_turns_for_the_one_that_is_to_meet_it() -> None:

@@ -61,7 +61,8 @@ class CCD(Checked, Descends):
     up to its frame; any other goal moves all joints between its frame and the root; the root itself stays. A Relative
     goal moves the joints of both frames by turns, but for those that move both. Limits hold, reach cones and ranges of
     motion if the problem has `ReachCones` and `RangeOfMotion`, clearances by the loop of Schmidl and Lin, which may
-    turn other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze` and `StepLimit` are taken.
+    turn other chains too. `Hold` relative to another frame is met as a `Relative` goal is, by the joints of both;
+    any other `Hold` is taken if no moving joint can move its frame. `Freeze` and `StepLimit` are taken.
     Balance, which a person keeps by default, is left to the assessment.
 
     Other terms (Balance, Plane, Axis, CenterOfMass, measures) are refused by name. The method
@@ -172,7 +173,8 @@ class _Search:
 
     def __init__(self, method: CCD, problem: Problem, shared: _Shared, control: Control) -> None:
         self._method, self._problem, self._control = method, problem, control
-        self._reach, self._resolver = shared.ready(read(problem, shared.workspace.state), control)
+        self._request = read(problem, shared.workspace.state)
+        self._reach, self._resolver = shared.ready(self._request, control)
         self._tolerance = min(TOLERANCE, SHARE * method.tolerance)
         self._resolver.begin(problem.clearances, self._tolerance, control)
         self._rng = np.random.default_rng(method.seed)
@@ -183,7 +185,7 @@ class _Search:
 
     def end(self) -> Ending:
         """The end of the search."""
-        best = self.run()
+        best = self._closed(self.run())
         turns = len(self.trace)
         return Ending(
             best.q,
@@ -214,6 +216,20 @@ class _Search:
         if self._solves(best):
             self.contradictions = ()
         return best if not self._control.over else replace(best, converged=False)
+
+    def _closed(self, best: _Trial) -> _Trial:
+        """A trial that misses the goals, or a posture on the way to it, where loops are closed and nothing overlaps."""
+        if not self._request.loops or self._solves(best):
+            return best
+        self._reach.begin(replace(self._request, goals=self._request.loops), Control(np.inf))
+        model, start = self._problem.scene.model, self._problem.scene.figure.clamp(self._problem.start)
+        for share in (1.0, 0.5, 0.25, 0.1, 0.0):
+            between = np.asarray(pin.interpolate(model, start, best.q, share))
+            q, closed = self._reach.run(between, SHARE * self._method.tolerance, self._method.iterations)
+            self._resolver.query(q)
+            if closed.error <= self._method.tolerance and self._resolver.deepest <= self._tolerance:
+                return replace(best, q=q)
+        return best
 
     def _ends(self, best: _Trial) -> bool:
         return self._solves(best) or self._control.over

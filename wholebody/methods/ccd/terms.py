@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wholebody.base.arrays import Array
 from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, joint_support
@@ -42,17 +43,20 @@ class Request:
     goals: tuple[GoalPlace, ...]
     joints: tuple[int, ...]
     kept: Kept
+    loops: tuple[GoalPlace, ...] = ()  # those of the goals that must be met: what is held by frames that move
 
 
 def read(problem: Problem, state: State | None = None) -> Request:
     """Convert a problem; `state`, if given, is moved to its start. An UnsupportedTermError lists all such terms."""
     reader = _Reader(problem, State(problem.scene.model) if state is None else state)
     goals = reader.goals()
+    loops = reader.loops()
     cones, ranges = reader.constraints()
     reader.others()
     if reader.refused:
         raise UnsupportedTermError("ccd", reader.refused)
-    return Request(goals, tuple(sorted(reader.joints)), Kept(frozenset(reader.fixed), cones, ranges))
+    kept = Kept(frozenset(reader.fixed), cones, ranges)
+    return Request((*goals, *loops), tuple(sorted(reader.joints)), kept, loops)
 
 
 class _Reader:
@@ -62,6 +66,7 @@ class _Reader:
         self._problem, self._figure, self._state = problem, problem.scene.figure, state
         self.refused: list[str] = []
         self.joints: set[int] = set()
+        self._closed: set[int] = set()  # identities of holds that are met as goals
         names = (bound.joints for bound in problem.bounds if isinstance(bound, Freeze))
         self.fixed = {self._figure.joint_id(name) for joints in names for name in self._figure.joint_names(joints)}
 
@@ -74,7 +79,7 @@ class _Reader:
                 self._move(where, goal.frame, reaching(self._figure, goal.frame))
                 found.append(_goal_place(goal))
             elif isinstance(goal, Relative):
-                found += self._relative(where, goal)
+                found += self._relative(where, goal.frame, goal.to, goal)
             else:
                 self.refused.append(where)
         return tuple(found)
@@ -85,13 +90,25 @@ class _Reader:
             self.refused.append(f"{where}({frame!r}), which no joint moves that may turn (the root stays)")
         self.joints.update(path)
 
-    def _relative(self, where: str, goal: Relative) -> list[GoalPlace]:
+    def loops(self) -> tuple[GoalPlace, ...]:
+        """What is held relative to frames that move, as goals of both frames; call `goals` first."""
+        found, closed = list[GoalPlace](), -1
+        while closed < len(self._closed):  # joints of a loop may move frames of another one
+            closed = len(self._closed)
+            for number, term in enumerate(self._problem.constraints):
+                if isinstance(term, Hold) and term.relative_to and id(term) not in self._closed and self._moves(term):
+                    self._closed.add(id(term))
+                    where = f"constraints[{number}], Hold"
+                    found += self._relative(where, term.frame, term.relative_to, term)
+        return tuple(found)
+
+    def _relative(self, where: str, frame: str, to: str, term: Relative | Hold) -> list[GoalPlace]:
         """A goal between two frames: the joints of both move, but for those that move both."""
-        place, base = goal.residual.place.joint, goal.residual.base.joint
+        place, base = term.residual.place.joint, term.residual.base.joint
         apart = set.symmetric_difference(*(set(self._figure.model.supports[joint]) for joint in (place, base)))
-        paths = [apart.intersection(reaching(self._figure, name)) for name in (goal.frame, goal.to)]
-        self._move(where, goal.frame, set().union(*paths))
-        return [one for one, path in zip(_ends(goal), paths, strict=True) if not path <= self.fixed]
+        paths = [apart.intersection(reaching(self._figure, name)) for name in (frame, to)]
+        self._move(where, frame, set().union(*paths))
+        return [one for one, path in zip(_ends(term), paths, strict=True) if not path <= self.fixed]
 
     def constraints(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of the reach cones and of the ranges of motion; call `goals` first."""
@@ -105,6 +122,8 @@ class _Reader:
                 cones.update(dict.fromkeys(self._figure.cones if term.names is None else term.names))
             elif isinstance(term, RangeOfMotion):
                 ranges.update(dict.fromkeys(term.row_names))
+            elif isinstance(term, Hold) and id(term) in self._closed:
+                continue
             elif isinstance(term, Hold):
                 self._hold(term, f"{where}({term.frame!r})")
             else:
@@ -113,14 +132,23 @@ class _Reader:
 
     def _hold(self, term: Hold, where: str) -> None:
         """Keep the joints that would move a frame, if it is where it is held and no goal needs them."""
-        model, support = self._problem.scene.model, joint_support(self._problem.scene.model)
-        carried = support[term.residual.place.joint] - support[term.residual.base.joint]  # of the world: none
-        if carried[[model.joints[joint].idx_v for joint in sorted(self.joints)]].any():
+        if self._moves(term):
             self.refused.append(f"{where}, which the joints that reach move too")
         elif np.abs(term.value(self._state.update(self._problem.start))).max() > 1e-6:  # m, rad
             self.refused.append(f"{where}, which is elsewhere at the start")
+        model, carried = self._problem.scene.model, self._carried(term)
         freedoms = enumerate(zip(model.idx_vs, model.nvs, strict=True))
         self.fixed |= {joint for joint, (first, count) in freedoms if joint and carried[first : first + count].any()}
+
+    def _moves(self, term: Hold) -> bool:
+        """Whether joints that reach move a frame against what it is held at."""
+        model = self._problem.scene.model
+        return bool(self._carried(term)[[model.joints[joint].idx_v for joint in sorted(self.joints)]].any())
+
+    def _carried(self, term: Hold) -> Array:
+        """(nv,) which freedoms move a frame against what it is held at; nothing moves the world."""
+        support = joint_support(self._problem.scene.model)
+        return np.asarray(support[term.residual.place.joint] - support[term.residual.base.joint])
 
     def others(self) -> None:
         """Refuse bounds, measures and joints without a counterpart in cyclic coordinate descent."""
@@ -157,12 +185,13 @@ def _target(asked: Any) -> tuple[Vector | None, Any]:
     return place, asked.placement.rotation if asked.orientation else None
 
 
-def _ends(goal: Relative) -> tuple[GoalPlace, GoalPlace]:
+def _ends(term: Relative | Hold) -> tuple[GoalPlace, GoalPlace]:
     """The frame with its target in the other one, and the other one with its target in the frame."""
-    (place, rotation), origin = _target(goal.residual), (0.0, 0.0, 0.0)
-    frame, to = goal.residual.place.frame, goal.residual.base.frame
+    (place, rotation), origin = _target(term.residual), (0.0, 0.0, 0.0)
+    frame, to = term.residual.place.frame, term.residual.base.frame
+    weight = term.weight if isinstance(term, Relative) else 1.0
     back = None if rotation is None else rotation.T
     return (
-        GoalPlace(frame, origin, place, rotation, goal.weight, to, 0),
-        GoalPlace(to, place or origin, origin, back, goal.weight, frame, 1),
+        GoalPlace(frame, origin, place, rotation, weight, to, 0),
+        GoalPlace(to, place or origin, origin, back, weight, frame, 1),
     )
