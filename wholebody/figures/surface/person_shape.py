@@ -83,9 +83,8 @@ class PersonShape:
 
     def garments(self) -> Iterator[Garment]:
         """Make the fields of all parts."""
-        shirt = self._shirt()
-        yield shirt
-        yield self._trousers(shirt.field)
+        yield self._shirt()
+        yield self._trousers()
         yield from self._head()
         for side, sign in SIDES:
             yield self._hand(side)
@@ -145,16 +144,11 @@ class PersonShape:
     def _shirt(self) -> Garment:
         size, scale = self.size, self.size.stature / 1.75
         neck = self.at("neck")
-        hem = half_space((0.0, 0.0, self._hem()), (0.0, 0.0, -1.0))
-        cuts, solids = [hem, half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))], [self._trunk]
+        solids = [self._trunk]
         for side, sign in SIDES:
-            wrist, elbow, thick = self.at(f"{side}_hand"), self.at(f"{side}_forearm"), size.body.radius("wrist")
-            along = (wrist - elbow) / np.linalg.norm(wrist - elbow)
-            cuts.append(half_space(wrist - 0.022 * scale * along, along))
-            cuff = round_cone(wrist - 0.06 * scale * along, wrist, thick, thick + 0.004)
             solids += [
                 self._limbs[f"{side}_clavicle"],
-                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"], cuff], 0.008),
+                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"]], 0.008),
                 self._trapezius(side),
                 *self._armpit(side),
             ]
@@ -170,6 +164,13 @@ class PersonShape:
         collar = 1.04 * size.body.radius("neck") + 0.006
         solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
         body = grown(union(solids, 0.035 * scale), 0.006)  # m of cloth
+        hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
+        opening = half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))
+        cuts = [hem, opening]
+        for side, _ in SIDES:
+            wrist, elbow = self.at(f"{side}_hand"), self.at(f"{side}_forearm")
+            along = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+            cuts.append(half_space(wrist - 0.022 * scale * along, along))
         segments = [*TRUNK, "neck", *self._sided("clavicle", "upper_arm", "forearm")]
         points = [self.at(name) for name in [*segments, *self._sided("hand")]]
         points += [np.array([0.1, 0.0, self._belt() - 0.04]), np.array([-0.1, 0.0, neck[2] + 0.06])]
@@ -196,14 +197,14 @@ class PersonShape:
             folds.append(round_cone(self.at(trunk_part, np.array(start) * scale), end, 0.045 * scale, radius))
         return folds
 
-    def _trousers(self, shirt: Field) -> Garment:
+    def _trousers(self) -> Garment:
         scale = self.size.stature / 1.75
         solids = [self._trunk]
         for side, sign in SIDES:
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
             solids.append(union(legs, 0.03))
             solids.append(self._buttock(sign))
-        body = _covered(grown(union(solids, 0.04 * scale), 0.003), shirt, self._hem())  # m of cloth
+        body = _tapered(grown(union(solids, 0.04 * scale), 0.003), self._belt() - 0.036 * scale)  # m of cloth
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
@@ -319,10 +320,6 @@ class PersonShape:
         """Height of the trousers' upper edge."""
         return float(self.bind["lower_lumbar"][2, 3]) + 0.005 * self.size.stature
 
-    def _hem(self) -> float:
-        """Height of the shirt's lower edge."""
-        return self._belt() - 0.022 * self.size.stature / 1.75
-
     def _trunk_ends(self, height: float) -> tuple[float, float]:
         """X of the trunk's back and front at a height."""
         inside = RAYS[self._trunk(np.column_stack([RAYS, np.zeros_like(RAYS), np.full_like(RAYS, height)])) < 0.0]
@@ -338,16 +335,9 @@ def _between(field: Field, low: float, high: float) -> Field:
     return lambda points: np.maximum(field(points), 0.0) + _outside(points[:, 2], low, high)
 
 
-def _covered(field: Field, cover: Field, height: float) -> Field:
-    """A solid that is 6 mm and more within another one above a height, and narrows towards it below."""
-
-    def covered(points: Array) -> Array:
-        found, below = field(points), height - points[:, 2]
-        near = below < 0.03  # m
-        found[near] = np.maximum(found[near], cover(points[near]) + 0.006 - np.maximum(2.0 * below[near] - 0.01, 0.0))
-        return found
-
-    return covered
+def _tapered(field: Field, height: float) -> Field:
+    """A solid that narrows above a height, so that it stays below the shirt whose hem is over it."""
+    return lambda points: field(points) + 0.4 * np.maximum(points[:, 2] - height, 0.0)
 
 
 def _outside(heights: Array, low: float, high: float) -> Array:
