@@ -67,6 +67,34 @@ def test_thighs_and_buttocks_are_level_on_a_seat(case):
     assert np.ptp(list(lowest.values())) < 1e-9
 
 
+@pytest.mark.parametrize("build", BUILDS[1::3], ids=range(len(BUILDS[1::3])))
+def test_a_seat_may_be_as_deep_as_buttock_popliteal_length(build):
+    """ANSUR II measures it in the seat's plane, from the buttocks to the back of the knee; the calf bulges below."""
+    figure = load("human", **build)
+    joints = ("left_hip_flexion", "right_hip_flexion", "left_knee_flexion", "right_knee_flexion")
+    q = figure.with_joints(pin.neutral(figure.model), dict.fromkeys(joints, math.pi / 2))
+    found = measure(figure)
+    placed = pin.GeometryData(figure.geometry)
+    pin.updateGeometryPlacements(figure.model, figure.model.createData(), figure.geometry, placed, q)
+    ends = {"pelvis": [], "shank": []}  # balls at the ends of the capsules
+    for piece, at in zip(figure.geometry.geometryObjects, placed.oMg, strict=True):
+        segment = piece.name.partition(":")[0].removeprefix("left_")
+        if segment in ends:
+            shape = piece.geometry
+            line = np.linspace(-shape.halfLength, shape.halfLength, 300)[:, None] * at.rotation[:, 2] + at.translation
+            ends[segment].append((line, shape.radius))
+    ((pelvis, rear),) = ends["pelvis"]
+    back, seat = pelvis[:, 0].min() - rear, pelvis[:, 2].min() - rear
+    for below, least, most in ((0.001, -0.006, 0.0), (0.02, -0.03, 0.0), (0.04, -0.045, -0.004)):
+        behind = []  # of the shank at some height below the seat
+        for line, radius in ends["shank"]:
+            high = line[:, 2] - seat + below
+            inside = abs(high) < radius
+            behind += list(line[inside, 0] - np.sqrt(radius**2 - high[inside] ** 2))
+        beyond = min(behind) - back - found["buttock_popliteal_length"]
+        assert least <= beyond <= most, (below, beyond)
+
+
 def test_calf_and_thigh_give_way_by_what_flesh_does():
     # The pair moves with the knee alone, so its limit stands for it: there they touch, and overlap by at most 40 mm.
     import coal

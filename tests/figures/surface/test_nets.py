@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from wholebody.figures.surface.fields import ball, box, ellipsoid, half_space, intersection, round_cone, union, without
-from wholebody.figures.surface.nets import triangles
+from wholebody.figures.surface.nets import coarsened, triangles
 
 LOW, HIGH = np.full(3, -0.2), np.full(3, 0.2)
 
@@ -79,3 +79,22 @@ def test_the_edge_of_a_cut_is_sharp_on_a_coarse_grid(normal: tuple[float, float,
     points, _ = trimesh.sample.sample_surface(mesh, 4000, seed=1)
     beyond = np.maximum(rod(points), (points - [0.0, 0.0, 0.03]) @ plane)
     assert np.abs(beyond).max() < 0.003
+
+
+@pytest.mark.parametrize("tilt", [0.2, 0.4, 0.6, 1.0])
+def test_few_triangles_keep_the_wall_of_a_tube_at_its_cut_end(tilt: float) -> None:
+    """A sleeve, and points 0.72 of its radius from its axis, 6 mm from its end: what it covers."""
+    along = np.array([np.sin(tilt), 0.3 * np.sin(tilt), np.cos(tilt)])
+    along /= np.linalg.norm(along)
+    tube = round_cone(-0.3 * along, 0.2 * along, 0.04, 0.04)
+    surface = triangles(tube, np.full(3, -0.4), np.full(3, 0.15), 0.02, [half_space((0.0, 0.0, 0.0), along)])
+    first = np.cross(along, (0.0, 1.0, 0.0))
+    first /= np.linalg.norm(first)
+    turn = np.linspace(0.0, 2.0 * np.pi, 60)[:, None]
+    within = -0.006 * along + 0.029 * (np.cos(turn) * first + np.sin(turn) * np.cross(along, first))
+    few = trimesh.Trimesh(surface.vertices, coarsened(surface), process=False)
+    a, b, c = np.moveaxis(few.triangles[None] - within[:, None, None], 2, 0)  # solid angles: van Oosterom and Strackee
+    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+    ab, bc, ca = ((one * other).sum(-1) for one, other in ((a, b), (b, c), (c, a)))
+    turned = np.arctan2((a * np.cross(b, c)).sum(-1), la * lb * lc + ab * lc + bc * la + ca * lb).sum(axis=1)
+    np.testing.assert_allclose(turned, 2.0 * np.pi, atol=1e-6)

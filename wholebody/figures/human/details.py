@@ -74,7 +74,7 @@ def _arm(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     # The underside of the bent forearm is level with the elbow's.
     up, name = thick - below, f"{side}_forearm"
     yield _between(f"{name}:0", name, thick, (up, 0.0, elbow - thick), (up, 0.0, -0.40 * fore))
-    yield _down(f"{side}_forearm:1", f"{side}_forearm", wrist, 0.45 * fore, fore - wrist)
+    yield _between(f"{name}:1", name, wrist, (0.0, 0.0, -0.45 * fore), (0.0, 0.0, wrist - fore))
 
 
 def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
@@ -104,10 +104,14 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     over = max(knee - person.size("seat"), 0.0)
     yield _between(f"{name}:1", name, knee, (over, 0.0, -0.6 * thigh), (0.0, 0.0, -thigh))
     calf, ankle = radius("calf"), radius("ankle")
-    name, shin = f"{side}_shank", 0.95 * knee - calf  # the shin is not before the knee
-    top, low = (min(back * calf, shin) for back in (-0.15, -0.25))
-    yield _between(f"{name}:0", name, calf, (top, 0.0, -0.1 * shank), (low, 0.0, -0.42 * shank))
-    yield _down(f"{name}:1", name, ankle, 0.55 * shank, 0.94 * shank)
+    name, shin = f"{side}_shank", 0.95 * knee  # the shin is not before the knee
+    upper, lower = (min(back * calf, shin - calf) for back in (-0.15, -0.25))
+    # In the seat's plane, where buttock-popliteal length ends, the calf is as far back as the knee.
+    top = person.size("seat") + math.sqrt(max(calf**2 - (knee + upper) ** 2, 0.0))
+    top = min(max(top, 0.1 * shank), 0.4 * shank)
+    yield _between(f"{name}:0", name, calf, (upper, 0.0, -top), (lower, 0.0, -0.42 * shank))
+    # Between knee and calf the shank is as thick as its bone.
+    yield _between(f"{name}:1", name, ankle, (shin - ankle, 0.0, -0.1 * shank), (0.0, 0.0, -0.94 * shank))
 
 
 def clavicle(size: Dimensions, side: str) -> Solid:
@@ -171,10 +175,6 @@ def trunk_slices(size: Dimensions) -> Iterator[Slice]:
         half, length = 0.5 * part.share * person.size(part.depth), person.length(part.segment)
         ahead = half - part.back(person.built[0])
         yield Slice(part.segment, ahead, z * length, half, 0.5 * person.size(part.breadth), high * length)
-
-
-def _down(name: str, segment: str, radius: float, start: float, end: float) -> Solid:
-    return _between(name, segment, radius, (0.0, 0.0, -start), (0.0, 0.0, -end))
 
 
 def _between(

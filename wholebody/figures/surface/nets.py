@@ -72,7 +72,10 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
     # edge
     turned = np.einsum("fi,fki->fk", across, surface.normals[faces]) < 0.3
     sharp = np.unique(faces[turned])
-    keys = np.column_stack([np.floor(vertices / cell), np.full(len(vertices), -1)]).astype(np.int64)
+    # Of a wall and the cap at its edge each keeps its own vertices: a common one would be behind the wall.
+    main = np.abs(surface.normals).argmax(axis=1)
+    facing = -1 - 2 * main - (np.take_along_axis(surface.normals, main[:, None], axis=1)[:, 0] > 0.0)
+    keys = np.column_stack([np.floor(vertices / cell), facing]).astype(np.int64)
     keys[sharp, 3] = sharp
     return clustered(vertices, faces, keys)
 

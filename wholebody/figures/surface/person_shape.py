@@ -110,6 +110,8 @@ class PersonShape:
             last = 0.5 * (last + caps(self.solids, f"{side}_forearm")[0][1])
         elif part == "forearm":
             start = 0.5 * (first + caps(self.solids, f"{side}_upper_arm")[-1][1])
+        elif part == "shank":
+            start = caps(self.solids, f"{side}_thigh")[-1][1]
         ends = (np.array([0.0, 0.0, top]), start), (end[:3], last)
         return placed(limb([ends[0], *balls, ends[1]], 0.040), self.bind[segment])
 
