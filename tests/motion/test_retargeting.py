@@ -305,6 +305,7 @@ def test_one_frame_is_retargeted(human: Figure) -> None:
     assert len(wb.retarget(person(1), human)) == 1
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_limbs_that_swing_wildly_stay_in_their_cones(human: Figure) -> None:
     """Five frames at 10 Hz in which arms and legs pass through each other: what mends that is drawn to and fro."""
     rng, still, dt = np.random.default_rng(110), person(2), 0.1
