@@ -153,3 +153,26 @@ def test_a_frame_that_would_not_end_is_refused(hand: wb.Figure, dt: float) -> No
     scene = floor(hand).add(wb.Sphere(0.05), name="ball", at=(3, 0, 0), body=wb.Body())
     with pytest.raises(InputError, match=r"dt is .*give a"):
         RigidBodies(scene).advance(dt)
+
+
+def test_what_is_taken_back_leaves_nothing_behind(hand: wb.Figure) -> None:
+    """A box that slides at another one; the contacts it has are those of where it is again, and what follows too."""
+    scene = floor(hand)
+    for name, x, speed in (("sliding", 3.0, 2.0), ("still", 3.15, 0.0)):
+        at, body = (x, 0.0, -1.95 + SKIN), wb.Body(velocity=(speed, 0.0, 0.0))
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name=name, at=at, body=body)
+    engine = RigidBodies(scene)
+    engine.advance(1 / 240)
+    owners, before = engine.contacts(["sliding"])
+    told, back = (engine.energy(), engine.time, *engine.momentum()), engine.way_back()
+    once = engine.advance(1 / 30)
+    ended = engine.placement("still")
+    back()
+    again, after = engine.contacts(["sliding"])
+    assert again == owners
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+    assert (engine.energy(), engine.time, *engine.momentum()) == told
+    twice = engine.advance(1 / 30)
+    assert len(once.events) == len(twice.events) > 0
+    np.testing.assert_allclose(engine.placement("still").homogeneous, ended.homogeneous, atol=1e-9)

@@ -303,3 +303,24 @@ def test_an_arm_alone_moves_the_arm_of_a_person_that_stays(human: Figure) -> Non
 
 def test_one_frame_is_retargeted(human: Figure) -> None:
     assert len(wb.retarget(person(1), human)) == 1
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_limbs_that_swing_wildly_stay_in_their_cones(human: Figure) -> None:
+    """Five frames at 10 Hz in which arms and legs pass through each other: what mends that is drawn to and fro."""
+    rng, still, dt = np.random.default_rng(110), person(2), 0.1
+    count = int(rng.choice([2, 3, 5, 12, 25]))
+    rng.choice(4)
+    times, local = dt * np.arange(count), np.tile(np.eye(3), (count, len(still.names), 1, 1))
+    for j, name in enumerate(still.names):
+        if name in ("pelvis", "neck", "head"):
+            continue
+        way = rng.normal(size=3) * (1.0 if "should" in name or "hip" in name else 0.4)
+        rate, phase = rng.uniform(0.5, 8.0), rng.uniform(0.0, 6.0)
+        if "shoulder" in name:
+            way[2] += (-1.3 if "left" in name else 1.3) * rng.uniform(0.0, 1.0)
+        local[:, j] = [pin.exp3(way * np.sin(rate * t + phase)) for t in times]
+    root = np.array([0.0, 0.0, 0.94]) + np.cumsum(0.01 * rng.normal(size=(count, 3)), axis=0)
+    clip = wb.retarget(SkeletonMotion.moved(still.names, still.parents, still.offsets, local, root, dt), human)
+    assert count == 5
+    assert within(clip)

@@ -234,6 +234,7 @@ class RigidBodies:
             state.bodies.moving[:] = moving
             self._old, self._falling, self._pushed, self.time = old, falling, pushed, now
             sleepers()
+            self._find_near(STEP)
 
         return back
 

@@ -36,12 +36,8 @@ from wholebody.motion.structure import upright
 from wholebody.motion.windows import leaning, normal
 from wholebody.scene.workspace import Workspace
 
-FIRST, FREE, FORWARD, SWEEP = (
-    60,
-    2,
-    3,
-    1,
-)  # most steps of a first frame, a free one, one of the first pass, one of a sweep
+# most steps of a first frame, a free one, one of the first pass, one of a sweep
+FIRST, FREE, FORWARD, SWEEP = 60, 2, 3, 1
 EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
@@ -362,6 +358,8 @@ class Run:
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
                 break
+            if number >= 4 * SWEEP:  # what is wanted draws q to and fro across an edge: then the least way back inside
+                goals, midway = with_values(goals, posture=q), []
             q = self.fitter.step(q, goals, most=self._room(q, before, span, after), midway=midway)
         if self.holds.touches:
             self.holds.touch(k, q, self.fitter.held(q), held)

@@ -90,6 +90,10 @@ def test_whose_body_it_is_comes_back(tmp_path: Path) -> None:
         ('stature="1.755"', 'stature="175.5"', "stature"),
         ('mass="84.6"', 'mass="much"', "give a finite number"),
         ('mass="84.6"', 'mass="84.6" dimensions="nose" values="0.05"', "nose"),
+        (' mass="84.6"', "", "mass=None; give a finite number"),
+        ('mass="84.6"', 'mass="84.6" age=""', "age=''; give a finite number"),
+        ('mass="84.6"', 'mass="84.6" values="0.93"', "values='0.93'; give 0 finite numbers"),
+        ('mass="84.6"', 'mass="84.6" dimensions="span span" values="1.7 1.8"', "'span' is stated twice"),
     ],
 )
 def test_a_person_whom_nobody_can_be_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -63,7 +63,7 @@ from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
 
 SIZES = ("stature", "mass", "age", "shoes", "clothing")
-"""Numbers of a person that a file has, those that are known."""
+"""Numbers of a person that a file has: the first two, and the others that are known."""
 
 
 def extension_text(figure: Figure) -> str:
@@ -242,10 +242,13 @@ class _Reader:
         item = self.element.find("person")
         if item is None:
             return None
-        place = self._place(item)
-        sizes = {name: numbers(item, name, place, 1)[0] for name in SIZES if item.get(name) is not None}
+        place, needed = self._place(item), SIZES[:2]
+        given = [name for name in SIZES if name in needed or item.get(name) is not None]
+        sizes = {name: numbers(item, name, place, 1)[0] for name in given}
         names = item.get("dimensions", "").split()
-        values = numbers(item, "values", place, len(names)) if names else ()
+        values = numbers(item, "values", place, len(names), "")
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise FileFormatError(f"{place}: {shown(twice[0])} is stated twice; state it once")
         try:
             return make_person(item.get("sex", ""), **sizes, proportions=dict(zip(names, values, strict=True)))
         except WholebodyError as error:
