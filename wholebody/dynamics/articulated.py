@@ -149,7 +149,7 @@ class Articulated:
         unborne = self.velocity
         bearing = self._bear(driven, points, time)
         impulse = blow + bearing
-        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time)
+        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         first, last = (points.figure @ (0.5 * both) for both in (start + begin, unborne + after))
@@ -157,10 +157,10 @@ class Articulated:
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
         paid = float(motor @ moves) + float(work[points.driven].sum())
-        motions = self._move(moves, segments, () if bearing.any() else drifted)
+        motions = self._move(moves, segments, drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
-        self._settle(began + paid, most, self._brought(drifted))
+        self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None
         frame = engine.advance(time, motions)
@@ -304,7 +304,7 @@ class Articulated:
         model, data, before = self._model, self._data, self._placements(segments)
         self.q = np.array(pin.integrate(model, self.q, way))
         pin.centerOfMass(model, data, self.q)
-        for root, (_, centre) in zip(self._roots if drifted else (), drifted, strict=True):
+        for root, (_, centre) in zip(self._roots, drifted, strict=True):
             first, seat = model.idx_qs[root], model.jointPlacements[root].rotation
             self.q[first : first + 3] += seat.T @ (centre - data.oMi[root].act(data.com[root]))
         after = self._placements(segments)
@@ -314,29 +314,23 @@ class Articulated:
         state = self._workspace.state.update(self.q)
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
 
-    def _drifted(self, momentum: Array, time: float) -> list[tuple[pin.Force, Array]]:
-        """Momenta about the origin and centres (3,) of what free roots carry, a time after the momenta (nv,)."""
+    def _drifted(self, momentum: Array, time: float, borne: bool) -> list[tuple[pin.Force, Array]]:
+        """Momenta about the origin and centres (3,) of what free roots carry, a time after the momenta (nv,).
+
+        Centres move by the mean of the velocities before and after, in a step with contacts (`borne`) by that after,
+        as the joints do. The weight acts where that keeps the angular momentum of a centre on its way.
+        """
         model, data, found = self._model, self._data, list[tuple[pin.Force, Array]]()
         pin.centerOfMass(model, data, self.q)
+        share = 1.0 if borne else 0.5
         for root in self._roots:
             first, place = model.idx_vs[root], data.oMi[root]
             now = place.act(pin.Force(momentum[first : first + 6]))
             mass, centre = data.mass[root], place.act(data.com[root])
-            weight, mean = time * mass * self._gravity, centre + 0.5 * time / mass * now.linear
-            then = now + pin.Force(weight, cross(mean, weight))
-            found.append((then, centre + 0.5 * time / mass * (now.linear + then.linear)))
-        return found
-
-    def _brought(self, drifted: Sequence[tuple[pin.Force, Array]]) -> list[pin.Force]:
-        """The momenta of what free roots carry, about the origin, with its centre where the posture has it.
-
-        In a step with contacts that is not quite where it drifts to; what turns about the centre stays the same.
-        """
-        model, data, found = self._model, self._data, list[pin.Force]()
-        pin.centerOfMass(model, data, self.q)
-        for root, (momentum, centre) in zip(self._roots, drifted, strict=True):
-            off = data.oMi[root].act(data.com[root]) - centre
-            found.append(momentum + pin.Force(np.zeros(3), cross(off, momentum.linear)))
+            weight = time * mass * self._gravity
+            way = time / mass * (now.linear + share * weight)
+            then = now + pin.Force(weight, cross(centre + (1.0 - share) * way, weight))
+            found.append((then, centre + way))
         return found
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
