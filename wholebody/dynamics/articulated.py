@@ -163,7 +163,8 @@ class Articulated:
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None
-        frame = engine.advance(time, motions)
+        borne = {name for name, c, *_ in points.pushes if bearing[c].any()}
+        frame = engine.advance(time, motions, borne)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
         self._react(self._left_for_later(frame, segments) if time <= SHORTEST else frame.wrenches, twists, segments)
         return time, frame
