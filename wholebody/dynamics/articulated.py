@@ -104,8 +104,6 @@ class Articulated:
     def _kinetic(self) -> float:
         return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
 
-    # ---- a step
-
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much.
 
@@ -164,24 +162,41 @@ class Articulated:
         if engine is None:
             return time, None
         borne = {name for name, c, *_ in points.pushes if bearing[c].any()}
+        energy = engine.energy()
         frame = engine.advance(time, motions, borne)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
-        self._react(self._left_for_later(frame, segments) if time <= SHORTEST else frame.wrenches, twists, segments)
+        given = self._left_for_later(frame, segments, energy) if time <= SHORTEST else frame.wrenches
+        self._react(given, twists, segments)
         return time, frame
 
-    def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int]) -> dict[str, Array]:
+    def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
         """The wrenches of the shortest step without its impacts with the figure, which the next step has at its start.
 
-        To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere.
+        To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere. Blows that
+        alternate with those of something else, as on what is squeezed, are taken back to the energy `most` [J].
         """
-        wrenches = dict(frame.wrenches)
-        for event in frame.given if _met(frame, segments) else ():
-            for own, other, impulse in (
-                (event.first, event.second, event.impulse), (event.second, event.first, -event.impulse)
-            ):  # fmt: skip
-                if own in segments and self._engine is not None:
-                    self._engine.push(other, -impulse, event.point)
-                    wrenches[own] = wrenches[own] + np.hstack([impulse, cross(event.point, impulse)])
+        wrenches, engine = dict(frame.wrenches), self._engine
+        met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
+        met += [(second, first, -impulse, point) for first, second, impulse, point in met]
+        blows = [blow for blow in met if blow[0] in segments] if _met(frame, segments) else []
+        if engine is None or not blows:
+            return wrenches
+
+        def taken_back(share: float) -> float:
+            for _, other, impulse, point in blows:
+                engine.push(other, -share * impulse, point)
+            return engine.energy()
+
+        none, half, full = engine.energy(), taken_back(0.5), taken_back(0.5)
+        square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
+        share = 1.0
+        if full > most and square > 0.0:
+            first = square + none - full
+            root = np.sqrt(max(0.0, first**2 - 4.0 * square * (none - most)))
+            share = min(max(0.5 * (first + root) / square, 0.0), 1.0)
+            taken_back(share - 1.0)
+        for own, _, impulse, point in blows:
+            wrenches[own] = wrenches[own] + share * np.hstack([impulse, cross(point, impulse)])
         return wrenches
 
     def _points(self, time: float, moved: Moved) -> Points:
@@ -200,7 +215,7 @@ class Articulated:
         normal = wrench[:, :3]
         height = (normal * middle).sum(axis=1)
         place = cross(normal, wrench[:, 3:]) + height[:, None] * normal
-        met = [self._owners(near.pair[row]) for row in contact.tolist()]
+        met = [(workspace.owners[first], workspace.owners[second]) for first, second in near.pair[contact].tolist()]
         touched = {name for both in met for name in both if name in names}
         owners, gap = met, rows.gap[kept]
         if touched and engine is not None:
@@ -234,10 +249,6 @@ class Articulated:
         gaps = self.q[at] - self._model.lowerPositionLimit[at], self._model.upperPositionLimit[at] - self.q[at]
         near = [gap < 0.02 + 1.5 * time * np.abs(self.velocity[freedom]) for gap in gaps]  # rad, m
         return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
-
-    def _owners(self, pair: Array) -> tuple[str, str]:
-        owners = self._workspace.owners
-        return owners[pair[0]], owners[pair[1]]
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
