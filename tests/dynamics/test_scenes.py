@@ -48,15 +48,15 @@ def test_one_domino_fells_all() -> None:
     assert max(frame.deepest for frame in frames) <= 1e-4
 
 
-@pytest.mark.parametrize("name", sorted({"flick", "dominoes", "stairs", "bag", "push_box"}))
 def test_the_hand_in_the_gallery_fells_dominoes_and_nothing_is_in_anything() -> None:
     _, frames = played("gallery", 0.28)
-    assert {name for name, _ in build_world_scene("gallery", frames=1).scene.objects.items()} > {"egg", "large ball"}
+    assert {"egg", "obelisk", "large ball", "carton"} <= build_world_scene("gallery", frames=1).scene.objects.keys()
     for number in range(1, 11):
         assert frames[-1].placements[f"domino {number}"].rotation[2, 2] < 0.7
     assert max(frame.deepest for frame in frames) <= 1e-4
 
 
+@pytest.mark.parametrize("name", sorted({"flick", "dominoes", "stairs", "bag", "push_box"}))
 def test_energy_grows_by_no_more_than_the_figure_gives(name: str) -> None:
     energy, frames = played(name, {"stairs": 0.15, "bag": 0.35, "push_box": 0.4}.get(name, 1.0))
     worked = 0.0
