@@ -296,7 +296,7 @@ class Articulated:
                 part = points.things[:, 6 * b : 6 * b + 6]
                 mobility += part @ self._engine.response(name) @ part.T
         after = speed.copy()
-        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 2000, 1e-7)
+        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 100, 1e-7)
         flat = impulse.ravel()
         gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
