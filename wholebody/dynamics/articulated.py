@@ -161,9 +161,9 @@ class Articulated:
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None
-        borne = {name for name, c, *_ in points.pushes if bearing[c].any()}
+        held = {name for name, c, *_ in points.pushes if bearing[c].any()}
         energy = engine.energy()
-        frame = engine.advance(time, motions, borne)
+        frame = engine.advance(time, motions, held)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
         given = self._left_for_later(frame, segments, energy) if time <= SHORTEST else frame.wrenches
         self._react(given, twists, segments)

@@ -70,8 +70,9 @@ class SceneFile:
     def __init__(self, path: Path, rooms: SceneFile | None = None) -> None:
         """Read a file, whose scenes may be in its rooms and in those of another."""
         self._data = parsed_toml(path.read_text("utf-8"), path.name)
-        for key in ("rooms", "colors") if rooms is not None else ():
-            self._data[key] = {**rooms._data[key], **self._data[key]}
+        if rooms is not None:
+            for key in ("rooms", "colors"):
+                self._data[key] = {**rooms._data[key], **self._data[key]}
         self.scenes: Mapping[str, str] = {name: plan["about"] for name, plan in self._data["scenes"].items()}
 
     def build(self, name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> InteractionScene:
