@@ -166,9 +166,10 @@ class LivePage:
         return ball
 
     def _radius(self, name: str) -> float:
-        """Of the ball of a handle, metres: small where others are near, as on the fingers of a hand."""
+        """Of the ball of a handle, metres: small where others are near, such as fingertips and dominoes."""
         here = self.drag.place(name)
-        apart = [float(np.linalg.norm(self.drag.place(other) - here)) for other in self.drag.handles]
+        others = (*self.drag.handles, *self.drag.things)
+        apart = [float(np.linalg.norm(self.drag.place(other) - here)) for other in others]
         return min(0.04, 0.5 * min((length for length in apart if length > 2e-3), default=1.0))
 
     def toggle(self, name: str) -> None:
