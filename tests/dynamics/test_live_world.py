@@ -162,3 +162,14 @@ def test_the_soles_of_every_one_of_several_people_are_held() -> None:
     two = wb.figures.join({"one": legs, "two": legs})
     held = {f"{name}/{side}_sole" for name in ("one", "two") for side in ("left", "right")}
     assert LiveWorld(wb.Scene(two)).held == held
+
+
+def test_a_finger_is_dragged_while_the_palm_is_held() -> None:
+    live = LiveWorld(wb.Scene(wb.load("hand")))
+    assert live.toggle("right_palm")
+    palm, tip = live.place("right_palm"), live.place("right_index_tip")
+    live.take("right_index_tip")
+    for number in range(20):
+        live.move(tip + np.array((-0.02, 0.0, -0.02)) * min(1.0, number / 12))
+    assert live.place("right_palm") == pytest.approx(palm, abs=1e-5)
+    assert live.place("right_index_tip") == pytest.approx(tip + (-0.02, 0.0, -0.02), abs=1e-3)

@@ -50,6 +50,14 @@ def test_one_domino_fells_all() -> None:
     assert max(frame.deepest for frame in frames) <= 1e-4
 
 
+def test_the_hand_in_the_gallery_fells_dominoes_and_nothing_is_in_anything() -> None:
+    _, frames = played("gallery", 0.28)
+    assert {"egg", "obelisk", "large ball", "carton"} <= build_world_scene("gallery", frames=1).scene.objects.keys()
+    for number in range(1, 11):
+        assert frames[-1].placements[f"domino {number}"].rotation[2, 2] < 0.7
+    assert max(frame.deepest for frame in frames) <= 1e-4
+
+
 @pytest.mark.parametrize("name", SHARES)
 def test_energy_grows_by_no_more_than_the_figure_gives(name: str) -> None:
     energy, frames = played(name, SHARES[name])

@@ -104,8 +104,6 @@ class Articulated:
     def _kinetic(self) -> float:
         return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
 
-    # ---- a step
-
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much.
 
@@ -149,7 +147,7 @@ class Articulated:
         unborne = self.velocity
         bearing = self._bear(driven, points, time)
         impulse = blow + bearing
-        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time)
+        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         first, last = (points.figure @ (0.5 * both) for both in (start + begin, unborne + after))
@@ -157,30 +155,48 @@ class Articulated:
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
         paid = float(motor @ moves) + float(work[points.driven].sum())
-        motions = self._move(moves, segments, () if bearing.any() else drifted)
+        motions = self._move(moves, segments, drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
-        self._settle(began + paid, most, self._brought(drifted))
+        self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None
-        frame = engine.advance(time, motions)
+        held = {name for name, c, *_ in points.pushes if bearing[c].any()}
+        energy = engine.energy()
+        frame = engine.advance(time, motions, held)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
-        self._react(self._left_for_later(frame, segments) if time <= SHORTEST else frame.wrenches, twists, segments)
+        given = self._left_for_later(frame, segments, energy) if time <= SHORTEST else frame.wrenches
+        self._react(given, twists, segments)
         return time, frame
 
-    def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int]) -> dict[str, Array]:
+    def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
         """The wrenches of the shortest step without its impacts with the figure, which the next step has at its start.
 
-        To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere.
+        To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere. Blows that
+        alternate with those of something else, as on what is squeezed, are taken back to the energy `most` [J].
         """
-        wrenches = dict(frame.wrenches)
-        for event in frame.given if _met(frame, segments) else ():
-            for own, other, impulse in (
-                (event.first, event.second, event.impulse), (event.second, event.first, -event.impulse)
-            ):  # fmt: skip
-                if own in segments and self._engine is not None:
-                    self._engine.push(other, -impulse, event.point)
-                    wrenches[own] = wrenches[own] + np.hstack([impulse, cross(event.point, impulse)])
+        wrenches, engine = dict(frame.wrenches), self._engine
+        met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
+        met += [(second, first, -impulse, point) for first, second, impulse, point in met]
+        blows = [blow for blow in met if blow[0] in segments] if _met(frame, segments) else []
+        if engine is None or not blows:
+            return wrenches
+
+        def taken_back(share: float) -> float:
+            for _, other, impulse, point in blows:
+                engine.push(other, -share * impulse, point)
+            return engine.energy()
+
+        none, half, full = engine.energy(), taken_back(0.5), taken_back(0.5)
+        square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
+        share = 1.0
+        if full > most and square > 0.0:
+            first = square + none - full
+            root = np.sqrt(max(0.0, first**2 - 4.0 * square * (none - most)))
+            share = min(max(0.5 * (first + root) / square, 0.0), 1.0)
+            taken_back(share - 1.0)
+        for own, _, impulse, point in blows:
+            wrenches[own] = wrenches[own] + share * np.hstack([impulse, cross(point, impulse)])
         return wrenches
 
     def _points(self, time: float, moved: Moved) -> Points:
@@ -199,7 +215,7 @@ class Articulated:
         normal = wrench[:, :3]
         height = (normal * middle).sum(axis=1)
         place = cross(normal, wrench[:, 3:]) + height[:, None] * normal
-        met = [self._owners(near.pair[row]) for row in contact.tolist()]
+        met = [(workspace.owners[first], workspace.owners[second]) for first, second in near.pair[contact].tolist()]
         touched = {name for both in met for name in both if name in names}
         owners, gap = met, rows.gap[kept]
         if touched and engine is not None:
@@ -233,10 +249,6 @@ class Articulated:
         gaps = self.q[at] - self._model.lowerPositionLimit[at], self._model.upperPositionLimit[at] - self.q[at]
         near = [gap < 0.02 + 1.5 * time * np.abs(self.velocity[freedom]) for gap in gaps]  # rad, m
         return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
-
-    def _owners(self, pair: Array) -> tuple[str, str]:
-        owners = self._workspace.owners
-        return owners[pair[0]], owners[pair[1]]
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
@@ -304,7 +316,7 @@ class Articulated:
         model, data, before = self._model, self._data, self._placements(segments)
         self.q = np.array(pin.integrate(model, self.q, way))
         pin.centerOfMass(model, data, self.q)
-        for root, (_, centre) in zip(self._roots if drifted else (), drifted, strict=True):
+        for root, (_, centre) in zip(self._roots, drifted, strict=True):
             first, seat = model.idx_qs[root], model.jointPlacements[root].rotation
             self.q[first : first + 3] += seat.T @ (centre - data.oMi[root].act(data.com[root]))
         after = self._placements(segments)
@@ -314,29 +326,23 @@ class Articulated:
         state = self._workspace.state.update(self.q)
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
 
-    def _drifted(self, momentum: Array, time: float) -> list[tuple[pin.Force, Array]]:
-        """Momenta about the origin and centres (3,) of what free roots carry, a time after the momenta (nv,)."""
+    def _drifted(self, momentum: Array, time: float, borne: bool) -> list[tuple[pin.Force, Array]]:
+        """Momenta about the origin and centres (3,) of what free roots carry, a time after the momenta (nv,).
+
+        Centres move by the mean of the velocities before and after, in a step with contacts (`borne`) by that after,
+        as the joints do. The weight acts where that keeps the angular momentum of a centre on its way.
+        """
         model, data, found = self._model, self._data, list[tuple[pin.Force, Array]]()
         pin.centerOfMass(model, data, self.q)
+        share = 1.0 if borne else 0.5
         for root in self._roots:
             first, place = model.idx_vs[root], data.oMi[root]
             now = place.act(pin.Force(momentum[first : first + 6]))
             mass, centre = data.mass[root], place.act(data.com[root])
-            weight, mean = time * mass * self._gravity, centre + 0.5 * time / mass * now.linear
-            then = now + pin.Force(weight, cross(mean, weight))
-            found.append((then, centre + 0.5 * time / mass * (now.linear + then.linear)))
-        return found
-
-    def _brought(self, drifted: Sequence[tuple[pin.Force, Array]]) -> list[pin.Force]:
-        """The momenta of what free roots carry, about the origin, with its centre where the posture has it.
-
-        In a step with contacts that is not quite where it drifts to; what turns about the centre stays the same.
-        """
-        model, data, found = self._model, self._data, list[pin.Force]()
-        pin.centerOfMass(model, data, self.q)
-        for root, (momentum, centre) in zip(self._roots, drifted, strict=True):
-            off = data.oMi[root].act(data.com[root]) - centre
-            found.append(momentum + pin.Force(np.zeros(3), cross(off, momentum.linear)))
+            weight = time * mass * self._gravity
+            way = time / mass * (now.linear + share * weight)
+            then = now + pin.Force(weight, cross(centre + (1.0 - share) * way, weight))
+            found.append((then, centre + way))
         return found
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:

@@ -77,7 +77,7 @@ class RigidBodies:
         self._joints = Joints(scene, pieces)
         self._finder, self._old = ContactFinder(pieces), Impulses.nothing(len(self._joints))
         self._sleepers = Sleepers(self.state, self._joints.together())
-        self._falling = pieces.dynamic.copy()
+        self._falling, self._borne = pieces.dynamic.copy(), np.zeros_like(pieces.dynamic)
         self._near: Contacts
         self._find_near(STEP)
         self._check_start()
@@ -182,13 +182,16 @@ class RigidBodies:
     def _number(self, name: str) -> int:
         return self._pieces.index[checks.known(name, self._pieces.index, "body")]
 
-    def advance(self, dt: float, kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None) -> EngineFrame:
+    def advance(
+        self, dt: float, kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None, borne: Collection[str] = ()
+    ) -> EngineFrame:
         """Advance by a frame.
 
         Args:
             dt: seconds.
             kinematic: name of a segment, or of a thing without a body, to its placements at the start and at the end of
                 the frame, between which it moves with constant velocity and angular velocity. What is not named stands.
+            borne: bodies that pushes given before bear during the frame: they move with their velocity at its end.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
         state, given = self.state, {self._number(name): pair for name, pair in given_placements(kinematic).items()}
@@ -198,6 +201,7 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
+        self._borne = np.isin(self.names, list(borne))
         count = int(np.ceil(dt / STEP - 1e-9))
         # early ends of steps: eight for a dozen bodies, as each costs a step of all of them
         stops = 96 // max(12, int(state.bodies.moving.sum()))
@@ -238,8 +242,6 @@ class RigidBodies:
 
         return back
 
-    # ---- a step
-
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
@@ -248,7 +250,7 @@ class RigidBodies:
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
-        falling = self._falling
+        falling = self._falling & ~self._borne
         program.read_velocities(falling)
         together = record.stops <= 0 or not ended
         time, stopped = self._until_impact(program, time, together)
@@ -315,7 +317,7 @@ class RigidBodies:
         hold = np.zeros((len(joints), 3))
         for closing in range(6):  # each closes what the one before left by bodies' turning
             program.solve(time, together, start, hold)
-            pushed = program.pushed()
+            pushed = program.pushed() | self._borne
             motion_kernel.drift(state.bodies, pushed, self.gravity, time)
             self._falling = ~pushed
             # s: in shorter steps joints only keep their velocities; rounding over such a time is no velocity

@@ -35,7 +35,7 @@ from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
 from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
-from wholebody.tracking.scenes import InteractionScene, SceneFile
+from wholebody.tracking.scenes import FILE, InteractionScene, SceneFile
 
 Advance = tuple[Array, Frame, Mapping[str, Array], EngineFrame | None]
 """The posture that was wanted, the frame, impulses on things, and what the things did."""
@@ -306,7 +306,7 @@ def _scene_instead(given: object) -> str:
     return correction
 
 
-_FILE = SceneFile(Path(__file__).with_name("scenes.toml"))
+_FILE = SceneFile(Path(__file__).with_name("scenes.toml"), FILE)
 
 WORLD_SCENES = _FILE.scenes
 """Descriptions of the scenes, by name."""

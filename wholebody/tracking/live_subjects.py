@@ -53,11 +53,11 @@ def handle_frames(frames: Collection[str]) -> list[str]:
 
 
 def handles_of(figure: Figure) -> list[str]:
-    """`handle_frames` of people, and the ends of the chains of other figures, such as a robot's."""
+    """`handle_frames` of people, and the ends of the chains of other figures, such as robots and a hand's fingers."""
     names = handle_frames({*figure.frames, *figure.segments})
-    people = {name.rpartition("/")[0] for name in names}
+    people = {name.rpartition("/")[0] for name in names if name.endswith("pelvis")}
     ends = [chain.tip for chain in figure.chains.values()] or figure.segments[-1:]
-    return [*names, *dict.fromkeys(name for name in ends if name.rpartition("/")[0] not in people)]
+    return list(dict.fromkeys([*names, *(name for name in ends if name.rpartition("/")[0] not in people)]))
 
 
 class LiveProblem:

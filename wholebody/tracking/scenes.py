@@ -67,8 +67,12 @@ class InteractionScene:
 class SceneFile:
     """Scenes with scripted trackers, of a TOML file such as `tracking/scenes.toml`, by name."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, rooms: SceneFile | None = None) -> None:
+        """Read a file, whose scenes may be in its rooms and in those of another."""
         self._data = parsed_toml(path.read_text("utf-8"), path.name)
+        if rooms is not None:
+            for key in ("rooms", "colors"):
+                self._data[key] = {**rooms._data[key], **self._data[key]}
         self.scenes: Mapping[str, str] = {name: plan["about"] for name, plan in self._data["scenes"].items()}
 
     def build(self, name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> InteractionScene:
@@ -197,12 +201,12 @@ def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) ->
     return np.array([figure.clamp(pin.integrate(figure.model, *pair)) for pair in zip(q, shake, strict=True)])
 
 
-_FILE = SceneFile(Path(__file__).with_name("scenes.toml"))
+FILE = SceneFile(Path(__file__).with_name("scenes.toml"))
 
-SCENES = _FILE.scenes
+SCENES = FILE.scenes
 """Descriptions of the scenes, by name; each lasts 600 frames or more."""
 
-build_scene = _FILE.build
+build_scene = FILE.build
 
 
 def gallery(figure: Figure) -> Scene:
@@ -215,4 +219,4 @@ def gallery(figure: Figure) -> Scene:
         >>> "bench" in wholebody.tracking.gallery(human).objects
         True
     """
-    return _FILE.furnish(Scene(one_figure(figure, "gallery: figure")), "gallery")
+    return FILE.furnish(Scene(one_figure(figure, "gallery: figure")), "gallery")

@@ -130,9 +130,8 @@ class LivePage:
 
     def _handle(self, name: str) -> Any:
         color = (90, 170, 90) if name in self.drag.things else _handle_color(name in self.drag.held)
-        # m: radius of a handle
         ball = self.server.scene.add_icosphere(
-            f"/handles/{name}", 0.04, color=color, position=self.drag.place(name), cast_shadow=False
+            f"/handles/{name}", self._radius(name), color=color, position=self.drag.place(name), cast_shadow=False
         )
         offset = np.zeros(3)
 
@@ -165,6 +164,13 @@ class LivePage:
             taken.on_drag(dragged)
             taken.on_click(clicked)
         return ball
+
+    def _radius(self, name: str) -> float:
+        """Of the ball of a handle, metres: small where others are near, such as fingertips and dominoes."""
+        here = self.drag.place(name)
+        others = (*self.drag.handles, *self.drag.things)
+        apart = [float(np.linalg.norm(self.drag.place(other) - here)) for other in others]
+        return min(0.04, 0.5 * min((length for length in apart if length > 2e-3), default=1.0))
 
     def toggle(self, name: str) -> None:
         """Hold or release a frame."""
