@@ -10,7 +10,6 @@ import pytest
 from tests.reference import active_set as reference
 from tests.reference.active_set import guess_active_set, objective, same
 from wholebody.base.arrays import with_values
-from wholebody.base.compiled import compiled
 from wholebody.base.errors import UnknownNameError
 from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.face_kernel import Face, minimise_on_face
@@ -18,11 +17,6 @@ from wholebody.methods.qp.quadratic_program import ActiveSet
 from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.working_set import WorkingSet
-
-
-@compiled(error_model="numpy")
-def called_from_python(program, active, face, count, tolerance, x):
-    return minimise_on_face(program, active, face, count, tolerance, x)
 
 
 def by_quadprog(program):
@@ -156,7 +150,7 @@ def test_the_compiled_minimiser_on_a_face_is_that_of_array_code(random_program, 
             stacked, right, 1.0 / weight, push, gradient, np.empty(0), np.empty((max(n, 1), n)), np.empty(n * n),
             np.empty(n), np.empty(n),
         )  # fmt: skip
-        finite = called_from_python(program, active, face, count, CORRECTIONS.tolerance, x)
+        finite = minimise_on_face(program, active, face, count, CORRECTIONS.tolerance, x)
         assert finite
         assert np.abs(x - wanted.x).max() < 1e-9
         scale = 1.0 + np.abs(push).max(initial=0.0)
