@@ -35,8 +35,7 @@ def as_dict(record: tuple[Any, ...]) -> dict[str, Any]:
 
 def with_values(record: Record, **values: Any) -> Record:
     """A copy of a record with other values of some fields, as `copy.replace` of Python 3.13 makes it."""
-    copied: Record = cast(Any, record)._replace(**values)
-    return copied
+    return type(record)(**{**as_dict(record), **values})
 
 
 def brief(self: Any) -> str:
