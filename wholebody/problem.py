@@ -379,8 +379,8 @@ class Problem(checks.FixedAttributes):
 
     def _resting(self) -> tuple[Indices, Array]:
         """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
-        with borrowed(self.scene.built) as workspace:
-            near = workspace.near_views(self._rest, self.clearance + 1e-9)
+        with borrowed(self.scene.built) as workspace, self.scene.figure.posed(self._rest) as state:
+            near = workspace.proximity.query_views(state.data, self.clearance + 1e-9)
             resting = near.distance >= -1e-6
             return near.number[resting], np.maximum(near.distance[resting], 0.0)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from itertools import pairwise
-from math import dist, hypot, isinf
+from math import hypot, isinf
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -119,17 +119,20 @@ def hull_corners(points: Array) -> list[int]:
 
     def half(indices: Iterable[int]) -> list[int]:
         chain: list[int] = []
+        bx = by = np.inf  # the last corner
         for k in indices:
             x, y = places[k]
             while len(chain) > 1:
-                (ax, ay), (bx, by) = places[chain[-2]], places[chain[-1]]
+                ax, ay = places[chain[-2]]
                 along, across = x - ax, y - ay
                 # Height [m] of a corner over the line through its neighbours below which it is no corner.
                 if (bx - ax) * across - (by - ay) * along > 1e-6 * hypot(along, across):
                     break
                 chain.pop()
-            if not chain or dist(places[k], places[chain[-1]]) > NEAREST:
+                bx, by = ax, ay
+            if hypot(x - bx, y - by) > NEAREST:
                 chain.append(k)
+                bx, by = x, y
         return chain
 
     lower, upper = half(order), half(reversed(order))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from functools import partial
+from functools import lru_cache, partial
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -27,7 +28,25 @@ FEET = ("left_foot", "right_foot")
 
 KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who kneels there
 
+UPRIGHT: tuple[type[Balance | LoadedBalance | Stand], ...] = (Balance, LoadedBalance, Stand)
+"""Terms that say how somebody stands."""
+
+CARRIED: tuple[type[Sit | Lean], ...] = (Sit, Lean)
+
+T = TypeVar("T")
+
 _effort, _rhythm = Effort(), Rhythm()
+
+
+def is_a(term: object, kinds: tuple[type[T], ...]) -> TypeGuard[T]:
+    """`isinstance`, remembered by class: to ask an abstract class takes three times as long."""
+    kind: Any = type(term)
+    return _derives(kind, kinds)
+
+
+@lru_cache(maxsize=256)
+def _derives(kind: Any, kinds: tuple[type, ...]) -> bool:
+    return issubclass(kind, kinds)
 
 
 def usual_measures(
@@ -43,9 +62,7 @@ def usual_measures(
     feet, sits = stances(scene, start, terms), seated(scene, terms)
     arms: tuple[str, ...] = ()
     if ranges:
-        stated = [
-            inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))
-        ]
+        stated = [inputs.body_of(scene, term.feet) for term in terms if is_a(term, UPRIGHT)]
         arms = free_arms(scene, start, terms, bounds, {*stated, *stands} - {None, *sits})
     make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
     found: tuple[Measure, ...] = scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
@@ -74,8 +91,7 @@ def default_measures(
     pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
     rhythm = _rhythm.resolve(scene, rest)
     if seated:
-        joints = [scene.model.joints[joint] for body in seated for joint in scene.figure.bodies[body]]
-        rhythm = rhythm.of_arms({int(joint.idx_v) for joint in joints})
+        rhythm = rhythm.of_arms(inputs.once(scene, ("places", seated), partial(_places, scene, seated)))
 
     def kept(kind: type[Stance | Hang], names: tuple[str, ...]) -> Measure:  # whatever the start is, it is the same
         return inputs.once(scene, (kind, names), lambda: kind(names).resolve(scene, rest))
@@ -84,9 +100,14 @@ def default_measures(
     return (_effort.resolve(scene, rest), rhythm, *(kept(Stance, pair) for pair in pairs), *free)
 
 
+def _places(scene: Surroundings, bodies: Sequence[str]) -> frozenset[int]:
+    """First places in the tangent of the joints of persons."""
+    return frozenset(int(scene.model.joints[joint].idx_v) for body in bodies for joint in scene.figure.bodies[body])
+
+
 def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The persons who sit on something, by what their names begin with."""
-    return tuple(body for term in terms if isinstance(term, Sit)
+    return tuple(body for term in terms if is_a(term, (Sit,))
                  if (body := inputs.body_of(scene, [term.frame])) is not None)  # fmt: skip
 
 
@@ -120,7 +141,7 @@ def _free_arms(scene: Surroundings, up: Set[str | None], bearing: Set[int], move
 
 def _bearing(scene: Surroundings, term: Constraint | Goal) -> tuple[int, ...]:
     """Joints that a resolved term moves; of a balance, which all masses move, what bears it. Empty: not known."""
-    if isinstance(term, (Balance, LoadedBalance, Stand)):
+    if is_a(term, UPRIGHT):
         loads = term.loads.places if isinstance(term, LoadedBalance) else ()
         return (*(inputs.find_place(scene, foot, "").joint for foot in term.feet), *(one.joint for one in loads))
     return _placed(term)
@@ -152,7 +173,7 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
         # The ankles of who stands are as near to the ground as knees.
         return bool(missed <= KNEELS) and max(upright) < 0.5
 
-    stand = (one for one in terms if isinstance(one, Stand))
+    stand = (one for one in terms if is_a(one, (Stand,)))
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
 
 
@@ -213,7 +234,7 @@ def standing(
 def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The figures with feet, by what their names begin with, of which no term says how they stand."""
     figure = scene.figure
-    stated = [inputs.body_of(scene, term.feet) for term in terms if isinstance(term, (Balance, LoadedBalance, Stand))]
+    stated = [inputs.body_of(scene, term.feet) for term in terms if is_a(term, UPRIGHT)]
     return tuple(
         body
         for body in figure.bodies
@@ -232,14 +253,14 @@ def _stands(
     root = f"{body}root"
     if any(isinstance(bound, Freeze) and root in figure.joint_names(bound.joints) for bound in bounds):
         return False
-    if any(isinstance(term, (Sit, Lean)) and str(term.frame).startswith(body) for term in terms):
+    if any(is_a(term, CARRIED) and str(term.frame).startswith(body) for term in terms):
         return False
     feet = {figure.place_of(foot).joint for foot in feet_names}
     mine = figure.bodies[body]
     holds = [
         term
         for term in terms
-        if isinstance(term, Hold) and not term.residual.base.frame and (not body or term.residual.place.joint in mine)
+        if is_a(term, (Hold,)) and not term.residual.base.frame and (not body or term.residual.place.joint in mine)
     ]
     if {term.residual.place.joint for term in holds} != feet:
         return False

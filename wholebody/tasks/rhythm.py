@@ -127,8 +127,9 @@ class Rhythm(SumOfSquares):
         girdles, knees, spines = inputs.once(scene, (Rhythm, self.style), partial(_parts, scene.figure, self.style))
         if not girdles and not spines:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
-        knees = tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in knees)
-        lumbar = tuple(with_values(spine, rest=_bent(start, spine)[0]) for spine in spines)
+        at = start.tolist()  # a few numbers are read faster from a list
+        knees = tuple([with_values(knee, rest=_beyond(at, knee)[0]) for knee in knees])
+        lumbar = tuple([with_values(spine, rest=_bent(at, spine)[0]) for spine in spines])
         return filled(self, girdles=girdles, knees=knees, lumbar=lumbar)
 
     def of_arms(self, idx_v: Set[int]) -> Rhythm:
@@ -140,10 +141,10 @@ class Rhythm(SumOfSquares):
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (k,) and their derivatives (k, nv): of each clavicle and knee, then of the lumbar spine."""
         parts: tuple[Any, ...] = (*self.girdles, *self.knees, *self.lumbar)
-        residuals, rows = np.zeros(len(parts)), np.zeros((len(parts), state.model.nv))
+        residuals, rows, at = np.zeros(len(parts)), np.zeros((len(parts), state.model.nv)), state.q.tolist()
         for row, part in enumerate(parts):
             bends = isinstance(part, Lumbar)
-            excess, slopes = _bent(state.q, part) if bends else _beyond(state.q, part)
+            excess, slopes = _bent(at, part) if bends else _beyond(at, part)
             places = [*part.idx_v, part.root[1] + 4, part.root[1] + 5] if bends else list(part.idx_v)
             root = math.sqrt(part.weight)
             residuals[row], rows[row, places] = root * excess, root * np.array(slopes)
@@ -197,9 +198,9 @@ def _lumbar(figure: Figure, body: str) -> tuple[Lumbar, ...]:
     return (Lumbar(*_places(figure, names), (int(root.idx_q), int(root.idx_v))),)
 
 
-def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float]]:
+def _beyond(q: Sequence[float], part: Elevation) -> tuple[float, tuple[float, float, float]]:
     """Angle of a joint beyond its share [rad], and its slopes by the joint, flexion and abduction."""
-    angle, flexion, abduction = (float(q[place]) for place in part.idx_q)
+    angle, flexion, abduction = [q[place] for place in part.idx_q]
     if part.onset:
         root = math.hypot(flexion, part.onset)
         share, slope = 0.5 * (flexion + root - part.onset), 0.5 * (1.0 + flexion / root)
@@ -212,12 +213,12 @@ def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float
     )
 
 
-def _bent(q: Array, lumbar: Lumbar) -> tuple[float, tuple[float, ...]]:
+def _bent(q: Sequence[float], lumbar: Lumbar) -> tuple[float, tuple[float, ...]]:
     """Flexion of the lumbar spine beyond its share [rad], its slopes by its joints and turns of the root about y, z."""
-    x, y, z, w = (float(value) for value in q[lumbar.root[0] + 3 : lumbar.root[0] + 7])
+    x, y, z, w = q[lumbar.root[0] + 3 : lumbar.root[0] + 7]
     forward, left, up = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
     # The root's x axis dips by sin(tilt) = -forward, the height of that axis.
     share = math.tanh(-LUMBAR_RATE * forward)
     steep = lumbar.most * LUMBAR_RATE * (1.0 - share * share)
-    flexion = sum(float(q[place]) for place in lumbar.idx_q)
+    flexion = sum([q[place] for place in lumbar.idx_q])
     return flexion - lumbar.most * share - lumbar.rest, (1.0, 1.0, 1.0, -steep * up, steep * left)
