@@ -4,8 +4,7 @@ A frame is advanced in steps of at most `STEP`. A step ends early at the next im
 resolved one by one (`impact_kernel`), and the motion goes on. In a step all contacts together have one program
 (`step_program`) that keeps every gap at `SKIN` or more at its end; then the bodies move (`motion_kernel`). A step after
 which pieces are in each other is made again with the points where they are; if that does not help, or pieces may have
-passed through each other on the way, with half the time. After too many stops in a frame the impacts of a step become
-part of its program.
+passed through each other on the way, with half the time. After too many stops a step's program has its impacts.
 """
 
 from __future__ import annotations

@@ -103,8 +103,12 @@ class State:
     def at(self, q: Array) -> State:
         """Move to the posture q as `update` does, unless `at` was asked for the same one last."""
         usual = type(q) is np.ndarray and q.dtype is DOUBLE and q.shape == (self._nq,)
-        if not usual or q.tobytes() != self._asked:
-            self.update(q := posture(q, self._nq).copy())._asked = q.tobytes()
+        if usual and q.tobytes() == self._asked:
+            return self
+        q = posture(q, self._nq)
+        asked = q.tobytes()
+        if asked != self._asked:
+            self.update(q.copy())._asked = asked
         return self
 
     def _take_jacobian(self) -> None:
