@@ -78,7 +78,8 @@ def test_degrees_in_settings_are_said(setting, said):
 
 def test_far_out_of_the_limits_is_said_also_where_degrees_would_be(scene):
     with pytest.warns(UserWarning, match=r"is 720 rad, far out of its limits, which are 0 and .* rad"):
-        scene.figure.with_joints(scene.figure.neutral, {ELBOW: 720.0})
+        q = scene.figure.with_joints(scene.figure.neutral, {ELBOW: 720.0})
+    assert scene.figure.joint_values(q)[ELBOW] == 720.0  # as it was given
 
 
 def test_postures_may_be_lists(scene, wrong):
@@ -94,7 +95,8 @@ def test_postures_within_and_a_little_beyond_the_limits_are_not_said(scene):
         warnings.simplefilter("error")
         for name in figure.postures:
             wb.Problem(scene, figure.posture(name))
-        wb.Problem(scene, figure.with_joints(figure.neutral, {ELBOW: high + 0.9}))
+        beyond = wb.Problem(scene, figure.with_joints(figure.neutral, {ELBOW: high + 0.9}))
+    assert figure.joint_values(beyond.start)[ELBOW] == pytest.approx(high + 0.9)
 
 
 ROBOT = """<robot name="arm"><link name="base"/><link name="tip">
@@ -112,8 +114,9 @@ ROBOT = """<robot name="arm"><link name="base"/><link name="tip">
 )
 def test_degrees_in_the_description_of_a_robot_are_said(tmp_path, rpy, kind, low, said):
     (tmp_path / "arm.urdf").write_text(ROBOT.format(rpy=rpy, kind=kind, low=low, high=1))
-    with pytest.warns(UserWarning, match=said):
+    with pytest.warns(UserWarning, match=said) as told:
         wb.load(str(tmp_path / "arm.urdf"))
+    assert len(told) == 1
 
 
 def test_degrees_in_the_limits_of_an_mjcf_are_said(tmp_path):
@@ -123,11 +126,13 @@ def test_degrees_in_the_limits_of_an_mjcf_are_said(tmp_path):
         '<geom type="sphere" size="0.1"/></body></worldbody></mujoco>'
     )
     with pytest.warns(UserWarning, match=r"joint 'turn': the lower limit is -90 rad; -90 degrees are -1.571"):
-        wb.load(str(tmp_path / "arm.xml"))
+        robot = wb.load(str(tmp_path / "arm.xml"))
+    assert robot.limits.lower.tolist() == [-90.0]  # as the file says
 
 
 def test_turns_without_limits_are_said_beyond_two_turns(tmp_path):
     (tmp_path / "arm.urdf").write_text(ROBOT.format(rpy="0 0 0", kind="continuous", low=0, high=0))
     figure = wb.load(str(tmp_path / "arm.urdf"))
     with pytest.warns(UserWarning, match=r"'turn' is 90 rad; 90 degrees are 1.571"):
-        figure.with_joints(figure.neutral, {"turn": 90.0})
+        q = figure.with_joints(figure.neutral, {"turn": 90.0})
+    assert q == pytest.approx((np.cos(90.0), np.sin(90.0)))

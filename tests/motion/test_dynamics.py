@@ -183,7 +183,7 @@ def test_a_support_that_is_left_is_said(recorded: wb.Clip, inside: bool, told: s
 
 
 def test_a_recording_is_slowed_and_stays_within_strength(recorded: wb.Clip) -> None:
-    """It crouches for a jump: the feet leave the ground between two frames of the slowed clip."""
+    """A ball is in the way of a man who crouches, whose knees need more than their strength unless he is slowed."""
     found = wb.avoid(recorded, _with_a_ball(recorded), dynamics=True, method=wb.motion.Trajectory(stretch=1.5))
     report = found.report
     assert not report.before.free

@@ -276,4 +276,5 @@ def test_what_frames_need_is_made_before_them(drag: LiveDrag, method: str, monke
             start = drag.place(name)
             for share in np.linspace(0.0, 1.0, 12):
                 drag.move(start + share * np.array(way))
+        assert np.linalg.norm(drag.place(name) - start) > 0.02
         drag.let_go()

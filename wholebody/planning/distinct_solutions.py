@@ -20,9 +20,6 @@ from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-LEAST = 40  # descents before a search counts as complete; 12 missed minima at limits, which few starts lead to
-SINGULAR = 1e-3  # m or rad per rad: least singular value of the goals at a posture that no neighbour's goals equal
-
 
 @dataclass(frozen=True)
 class Solutions(Sequence[Solution]):
@@ -123,7 +120,8 @@ def solutions(
         if answer.solved:
             descents += 1
             known = _with(problem, known, answer, apart)
-        complete = all_found(len(known), descents, LEAST) if branches is None else begun == len(branches)
+        # After 12 descents minima at limits, which few starts lead to, were missed.
+        complete = all_found(len(known), descents, 40) if branches is None else begun == len(branches)
         if complete:
             break
     complete = complete and _stand_alone(problem, [answer.q for answer in known])
@@ -142,7 +140,8 @@ def _stand_alone(problem: Problem, postures: Iterable[Array]) -> bool:
     with problem.borrow() as workspace:
         lineariser = problem.lineariser(workspace)
         goals = [lineariser.at(q, 0.0).goal_jacobian for q in postures]
-    return all(len(rows) >= rows.shape[1] and np.linalg.svd(rows, compute_uv=False)[-1] >= SINGULAR for rows in goals)
+    least = 1e-3  # m or rad per rad: singular value of goals that no neighbour meets
+    return all(len(rows) >= rows.shape[1] and np.linalg.svd(rows, compute_uv=False)[-1] >= least for rows in goals)
 
 
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:

@@ -53,8 +53,6 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
 )
-# of the way between the ends, where samples are; beyond them at an end: half, as bodies leave narrow places as they are
-SHARES = (-0.5, 1.5)
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
@@ -300,8 +298,9 @@ class _Search:
                     continue
             rounds += 1
             near = ends[self._rng.integers(len(ends))]
-            share = np.clip(self._rng.uniform(*SHARES), 0.0, 1.0)
-            middle = np.asarray(pin.interpolate(model, start, near, float(share)))
+            # Half of the samples are at an end: bodies leave narrow places as they are.
+            share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
+            middle = np.asarray(pin.interpolate(model, start, near, share))
             sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue

@@ -31,8 +31,6 @@ KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who k
 UPRIGHT: tuple[type[Balance | LoadedBalance | Stand], ...] = (Balance, LoadedBalance, Stand)
 """Terms that say how somebody stands."""
 
-CARRIED: tuple[type[Sit | Lean], ...] = (Sit, Lean)
-
 T = TypeVar("T")
 
 _effort, _rhythm = Effort(), Rhythm()
@@ -253,7 +251,7 @@ def _stands(
     root = f"{body}root"
     if any(isinstance(bound, Freeze) and root in figure.joint_names(bound.joints) for bound in bounds):
         return False
-    if any(is_a(term, CARRIED) and str(term.frame).startswith(body) for term in terms):
+    if any((is_a(term, (Sit,)) or is_a(term, (Lean,))) and str(term.frame).startswith(body) for term in terms):
         return False
     feet = {figure.place_of(foot).joint for foot in feet_names}
     mine = figure.bodies[body]
