@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,7 +62,7 @@ def gaps(clip: wb.Clip, side: str, thing: str = "box", shape: coal.ShapeBase = B
             if joint in figure.model.supports[piece.parentJoint]
         ]  # fmt: skip
         wrist = where.actInv(np.array(data.oMi[joint].translation))
-        found.append([min(apart), *wrist])
+        found.append([min(apart, default=np.inf), *wrist])
     return np.array(found)
 
 
@@ -132,8 +133,11 @@ def test_two_hands_stay_on_a_bar(stature: float, far: float) -> None:
     assert wb.check(clip, scene).free
 
 
-def robot(folder: Path) -> wb.Figure:
-    """A robot of 1.75 m without hands: an arm ends beyond two joints of its wrist, which are 8 cm apart."""
+def robot(folder: Path, forearm: float | None = None) -> wb.Figure:
+    """A robot of 1.75 m without hands: an arm ends beyond two joints of its wrist, which are 8 cm apart.
+
+    With a radius of its `forearm` that alone has a piece, which goes on for 5 cm beyond the last joint.
+    """
     parts = ["<link name='pelvis'/>"]
 
     def joint(name: str, parent: str, at: str, axis: str, shape: str = "", off: str = "0 0 0") -> str:
@@ -153,6 +157,12 @@ def robot(folder: Path) -> wb.Figure:
         end = joint(f"{side}_shoulder_pitch", "pelvis", f"0 {0.18 * y} 0.5", "0 1 0")
         end = joint(f"{side}_shoulder_roll", end, "0 0 0", "1 0 0")
         end = joint(f"{side}_shoulder_yaw", end, "0 0 0", "0 0 1")
+        if forearm is not None:
+            long = f"<cylinder radius='{forearm}' length='0.2'/>"
+            end = joint(f"{side}_elbow", end, "0 0 -0.28", "0 1 0", long, "0 0 -0.18")
+            end = joint(f"{side}_wrist_roll", end, "0 0 -0.15", "0 0 1")
+            end = joint(f"{side}_wrist_yaw", end, "0 0 -0.08", "1 0 0")
+            continue
         end = joint(f"{side}_elbow", end, "0 0 -0.28", "0 1 0", "<sphere radius='0.03'/>")
         end = joint(f"{side}_wrist_roll", end, "0 0 -0.15", "0 0 1", "<sphere radius='0.03'/>")
         end = joint(f"{side}_wrist_yaw", end, "0 0 -0.08", "1 0 0", "<box size='0.06 0.03 0.1'/>", "0 0 -0.05")
@@ -170,6 +180,25 @@ def test_a_robot_lifts_a_box_between_the_ends_of_its_arms(tmp_path: Path) -> Non
         off = gaps(clip, side, end="wrist_yaw")[:, 0]
         assert off.min() > 0.0
         assert off.max() < 1e-3
+    assert wb.check(clip, scene).free
+
+
+@pytest.mark.parametrize("radius", [0.01, 0.035])
+def test_a_robot_without_pieces_at_its_wrists_keeps_these_at_a_box(radius: float, tmp_path: Path) -> None:
+    """Wrists are 3 cm from the box in the recording; a forearm that is thicker lies against it."""
+    motion, track = lifting()
+    figure = robot(tmp_path, radius)
+    scene = among(figure, track[0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # "does not reach"
+        clip = wb.retarget(motion, figure, scene, things={"box": track})
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        wrist = gaps(clip, side, end="wrist_yaw")[:, 1:]
+        forearm = gaps(clip, side, end="elbow")[:, 0]
+        assert forearm.min() > 0.0
+        assert np.ptp(wrist, axis=0).max() < 1e-3
+        off = sign * wrist[:, 1] - 0.5 * SIZE[1] - 0.03 if radius < 0.03 else forearm
+        assert np.abs(off).max() < 1.5e-3
     assert wb.check(clip, scene).free
 
 

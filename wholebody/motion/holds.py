@@ -10,6 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -46,20 +47,39 @@ class Touched:
         return pin.SE3.Identity() if contact.base else self.things.at(contact.thing, frame)
 
     def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
-        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
+        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it.
+
+        A part without pieces has none: its point is as far away as the skeleton's place is.
+        """
         pin.forwardKinematics(self._figure.model, self._data, q)
         normal = self._data.oMi[contact.base].rotation @ self.at(contact, contact.first).rotation @ contact.normal
         pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
-        away = CLEARANCE + thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
-        return contact.place + away * contact.normal
+        away = thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
+        if not self._carried(point.joint):
+            away = contact.away
+        return contact.place + (CLEARANCE + away) * contact.normal
 
     def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
         """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
         pin.forwardKinematics(self._figure.model, self._data, q)
-        own = self._carried(point.joint)
+        own = self._part(point.joint, point.place, contact.away)
         if not contact.base:
             return least_distance(own, self.things.pieces(contact.thing, frame))
-        return least_distance(own, self._carried(contact.base, most=int(contact.thing.endswith("hand"))))
+        center = contact.place - contact.away * contact.normal
+        other = self._part(contact.base, center, contact.away, most=int(contact.thing.endswith("hand")))
+        return least_distance(own, other)
+
+    def _part(self, joint: int, center: Array, radius: float, most: int = 100) -> list[Placed]:
+        """What a joint carries, see `_carried`; where that is nothing, a ball about a place (3,), and the limb before.
+
+        The limb may reach beyond the place: then it is what touches.
+        """
+        if carried := self._carried(joint, most):
+            return carried
+        ball = coal.Sphere(max(radius, 1e-6)), self._data.oMi[joint] * pin.SE3(np.eye(3), center)
+        bearing = {piece.parentJoint for piece in self._figure.geometry.geometryObjects}
+        limb = max(bearing & set(self._figure.model.supports[joint]), default=joint)
+        return [ball, *self._carried(limb, 0)]
 
     def _carried(self, joint: int, most: int = 100) -> list[Placed]:
         """Pieces on a joint and beyond it, over `most` joints with pieces at most."""

@@ -30,7 +30,7 @@ BODY = {
 }
 """Of parts that hands touch both ends of a bone, and how far a hand that touches them is from it, metres."""
 
-HAND = 0.06  # m: as far from each other are hands that touch
+HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
 SLACK = 0.02  # m: farther away than that by more than this nothing is touched: hands that swing past hips do not
 ARM = ("shoulder", "elbow", "wrist", "hand")
 OUTSIDE = 0.1  # m: so far outside of a part the nearest place on it is on the side that the hand came from
@@ -113,6 +113,10 @@ def own_contacts(
         near = {joint: nearest(pieces[joint], data.oMi[joint].actInv(here))[0] for joint in body}
         base = min(near, key=lambda joint: near[joint]) if other is None else other.joint
         start = here if other is None else data.oMi[base].act(other.place)
-        _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + OUTSIDE * rest.normal))
-        found.append(with_values(rest, place=place, normal=normal, base=base))
+        if base in pieces:
+            _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + OUTSIDE * rest.normal))
+        else:
+            place = data.oMi[base].actInv(start + 0.5 * HAND * rest.normal)
+            normal = data.oMi[base].rotation.T @ rest.normal
+        found.append(with_values(rest, place=place, normal=normal, base=base, away=0.5 * HAND))
     return found

@@ -70,8 +70,7 @@ class Layout(NamedTuple):
     bones: Array  # (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor
     bone_weights: Array  # (b,) weight of each
     turn_weights: Array  # (t,) weight of each angle, metres per radian
-    # of each point that may be held its joint, its place (3,) in it, and the joint of its base, 0 for the world
-    held: list[tuple[int, Array, int]]
+    held: list[HeldPoint]  # points that may be held
 
 
 class Fitter:
@@ -80,10 +79,11 @@ class Fitter:
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
-        points = [*layout.points, *layout.held]
-        self._place_joints = np.array([joint for joint, *_ in points], dtype=np.intp)
-        self._local = np.array([place for _, place, *_ in points]).reshape(-1, 3)
-        self._bases = np.array([base for _, _, base in layout.held], dtype=np.intp)
+        points = [*layout.points, *((point.joint, point.place) for point in layout.held)]
+        self._place_joints = np.array([joint for joint, _ in points], dtype=np.intp)
+        self._local = np.array([place for _, place in points]).reshape(-1, 3)
+        self._bases = np.array([point.base for point in layout.held], dtype=np.intp)
+        self._touching = np.repeat([point.thing for point in layout.held], 3).astype(bool)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
         moved = self._state.support[[*self._place_joints, *self._turn_joints]]
         moved[len(layout.points) : len(self._local)] -= self._state.support[self._bases]
@@ -111,6 +111,8 @@ class Fitter:
         self._cone_rows, self._angles = np.zeros((len(cones), 6)), np.zeros(len(cones))
         self._free = 6 if figure.root == "free" else 0
         self._diagonal = np.diag_indices(figure.model.nv)
+        self._turning = np.ones(figure.model.nv)  # 0 for what moves along lines
+        self._turning[: self._free // 2] = 0.0
 
     def _carried(self, frames: list[str]) -> tuple[Indices, Array]:
         """The joint that carries each frame, and in it the frame's rotation (3, 3) over its place: (k, 4, 3)."""
@@ -163,7 +165,7 @@ class Fitter:
         square = goals.posture_weights**2
         gradient = rows.T @ errors + square * posture
         hessian = rows.T @ rows
-        hessian[self._diagonal] += square + damping
+        hessian[self._diagonal] += square + damping + self._curvature(errors, goals)
         lower, upper = self.figure.tangent_bounds(q)
         lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
         lower[: self._free], upper[: self._free] = -10.0, 10.0  # m, rad
@@ -239,6 +241,15 @@ class Fitter:
         angles = self._turn_weights * np.array([pin.log3(turn) for turn in turned]).reshape(-1)
         return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])
 
+    def _curvature(self, errors: Array, goals: Goals) -> Array:
+        """(nv,) bounds of what the rows leave out: a turn's second derivative times what a touching point misses.
+
+        Without it a step turns wrists far for millimetres, as their levers are short, and the next one turns them back.
+        """
+        first, weights = len(self._bones), goals.held_weights.ravel()[self._touching]
+        pull = np.abs(errors[first : first + goals.held.size][self._touching] * weights).max(initial=0.0)
+        return np.asarray(LEAST_LEVER * pull * self._turning)
+
     def _rows(self, places: Array, goals: Goals) -> Array:
         """Derivatives (m, nv) of the weighted errors."""
         (x, y, z), count = places.T, 3 * len(places)
@@ -304,5 +315,5 @@ def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure,
     return Layout(
         [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
         np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
-        [(point.joint, point.place, point.base) for point in held],
+        held,
     )  # fmt: skip

@@ -44,6 +44,7 @@ class ThingContact(NamedTuple):
     normal: Array  # (3,) of unit length, out of the thing, in its axes
     share: float = 1.0  # of a hand: where between its wrist and its joint it touches
     base: int = 0  # joint of the figure whose axes these are, where the thing is a part of its body; else 0
+    away: float = 0.0  # metres from the surface to the skeleton's place, at which a part without pieces is held
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -142,8 +143,8 @@ class Things:
                 for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
                     middles = [each[run.first : run.end].mean(axis=0) for each in local]
                     ends = [nearest(pieces, middle) for middle in middles]
-                    share, (_, place, normal) = min(zip(shares, ends, strict=True), key=lambda one: abs(one[1][0]))
-                    found.append(ThingContact(role, *run, name, place, normal, share))
+                    share, (gap, place, normal) = min(zip(shares, ends, strict=True), key=lambda one: abs(one[1][0]))
+                    found.append(ThingContact(role, *run, name, place, normal, share, away=max(gap, 0.0)))
                     free[run.first : run.end] = False
         return sorted(found, key=lambda one: one.first)
 
