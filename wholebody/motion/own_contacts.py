@@ -108,6 +108,8 @@ def own_contacts(
     body, found = [joint for joint in pieces if not arms & set(model.supports[joint])], []
     for rest in rests:
         hand, other = hands[rest.role], hands.get(rest.thing)
+        if other is None and not body:
+            continue  # a body without pieces has nothing to touch
         pin.forwardKinematics(model, data, free[(rest.first + rest.end) // 2])
         here = data.oMi[hand.joint].act(hand.place)
         near = {joint: nearest(pieces[joint], data.oMi[joint].actInv(here))[0] for joint in body}

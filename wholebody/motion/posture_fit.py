@@ -83,7 +83,9 @@ class Fitter:
         self._place_joints = np.array([joint for joint, _ in points], dtype=np.intp)
         self._local = np.array([place for _, place in points]).reshape(-1, 3)
         self._bases = np.array([point.base for point in layout.held], dtype=np.intp)
-        self._touching = np.repeat([point.thing for point in layout.held], 3).astype(bool)
+        bearing = {joint for piece in figure.geometry.geometryObjects for joint in self.model.supports[piece.parentJoint]}
+        bare = [bool(point.thing) and point.joint not in bearing for point in layout.held]
+        self._bare = np.repeat(np.array(bare, dtype=bool), 3)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
         moved = self._state.support[[*self._place_joints, *self._turn_joints]]
         moved[len(layout.points) : len(self._local)] -= self._state.support[self._bases]
@@ -242,12 +244,12 @@ class Fitter:
         return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])
 
     def _curvature(self, errors: Array, goals: Goals) -> Array:
-        """(nv,) bounds of what the rows leave out: a turn's second derivative times what a touching point misses.
+        """(nv,) bounds of what the rows leave out: a turn's second derivative times what a point without pieces misses.
 
         Without it a step turns wrists far for millimetres, as their levers are short, and the next one turns them back.
         """
-        first, weights = len(self._bones), goals.held_weights.ravel()[self._touching]
-        pull = np.abs(errors[first : first + goals.held.size][self._touching] * weights).max(initial=0.0)
+        first, weights = len(self._bones), goals.held_weights.ravel()[self._bare]
+        pull = np.abs(errors[first : first + goals.held.size][self._bare] * weights).max(initial=0.0)
         return np.asarray(LEAST_LEVER * pull * self._turning)
 
     def _rows(self, places: Array, goals: Goals) -> Array:
