@@ -33,7 +33,6 @@ from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
-PARTED = 0.2  # share of an overlap that a step removes
 FASTEST = 0.5  # m/s, at most
 
 
@@ -278,7 +277,8 @@ class Articulated:
     def _bear(self, inertia: Array, points: Points, time: float) -> Array:
         """Keep points apart at the end of a step; the impulses (m, 3)."""
         room = points.gap - SKIN
-        target = np.where(room >= 0.0, -room / time, np.minimum(-PARTED * room / time, FASTEST))
+        # a step removes a fifth of an overlap
+        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, FASTEST))
         speed = self._relative(points)
         if points.bodies and self._engine is not None:
             fall = [self._engine.response(name)[:, :3] @ self._engine.weight(name) for name in points.bodies]

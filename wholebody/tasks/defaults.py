@@ -26,8 +26,6 @@ from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
 
-KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who kneels there
-
 UPRIGHT: tuple[type[Balance | LoadedBalance | Stand], ...] = (Balance, LoadedBalance, Stand)
 """Terms that say how somebody stands."""
 
@@ -169,7 +167,8 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
             upright = [abs(state.frame(shank.frame).rotation[2, 2]) for shank in shanks]
         missed = np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()
         # The ankles of who stands are as near to the ground as knees.
-        return bool(missed <= KNEELS) and max(upright) < 0.5
+        # m, rad: who misses a `Stand` by less at the start kneels there
+        return bool(missed <= 0.05) and max(upright) < 0.5
 
     stand = (one for one in terms if is_a(one, (Stand,)))
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))

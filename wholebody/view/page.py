@@ -18,8 +18,6 @@ from typing import Any
 from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Command, bundle
 
-LARGE = 2_000  # bytes of a command that scenes of a notebook share
-
 
 def live_page(title: str = "wholebody") -> str:
     """HTML of a page that connects to its server."""
@@ -46,7 +44,8 @@ def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
         if cell is not None and carrier[0] == cell[0] and carrier != cell:  # what an earlier run of this cell had
             del _carriers[name]
     parts = [player() if _is_first(cell, "player") else _data("player")]
-    for large, some in groupby(commands, lambda command: len(command.payload) > LARGE):
+    # bytes of commands that scenes of a notebook share
+    for large, some in groupby(commands, lambda command: len(command.payload) > 2_000):
         content = _bundled(some)
         name = sha256(content).hexdigest()[:16] if large else f"scene {len(parts)}"
         parts.append(_data(name, content if not large or _is_first(cell, name) else None))

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from wholebody.view.viewer import Viewer
 
 NOTHING = "nothing"
-PICTURES = 8
 ENDINGS = (".glb", ".htm", ".html", ".mp4", ".gif", ".png")
 
 
@@ -41,7 +40,7 @@ ghost. With --equipment the body is shown with what it wears.""",
         help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
     ),
     option("--out", type=Path, metavar="OUT", help=".html, .glb, .mp4, .gif or .png"),
-    option("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)"),
+    option("--pictures", type=int, default=8, metavar="N", help="of a strip (default: 8)"),
     epilog="""\
 examples:
   wholebody clip play walk.bvh
