@@ -126,7 +126,7 @@ class SweptDepth:
             parts = self._kernel.Parts(numbers, first, last, rows0, rows1, speed[numbers], -allowed)
             motion = self._kernel.Speeds(self._bounds.turn, self._bounds.speed, self._bounds.carries)
             self._kernel.lower_bounds(parts, stack.places, self._shapes, motion, share, ACCURACY, least)
-            # A hand moves 0.02 mm in the shortest part that is looked at. What is in doubt there gets the depth it may have.
+            # The shortest parts, 0.02 mm of a hand: what is in doubt there gets the depth that it may have.
             kept = least >= -allowed if share > 2.0**-12 else np.ones(len(which), dtype=bool)
             np.maximum.at(bound, which[kept], -least[kept])
             going = np.flatnonzero(~kept)
