@@ -88,7 +88,8 @@ class Articulated:
 
     def energy(self) -> float:
         """Kinetic and potential energy, joules."""
-        return self._kinetic() + float(pin.computePotentialEnergy(self._model, self._data, self.q))
+        kinetic = 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
+        return kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q))
 
     def momentum(self) -> Array:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,)."""
@@ -99,9 +100,6 @@ class Articulated:
     def _inertia(self, q: Array) -> Array:
         upper = np.triu(pin.crba(self._model, self._data, q))
         return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
-
-    def _kinetic(self) -> float:
-        return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much.
