@@ -233,7 +233,7 @@ class Problem(checks.FixedAttributes):
     def stated(self) -> tuple[Constraint, ...]:
         """The constraints without the defaults."""
         added = {id(term) for term in self.defaults}
-        return tuple(term for term in self.constraints if id(term) not in added)
+        return tuple([term for term in self.constraints if id(term) not in added]) if added else self.constraints
 
     @property
     def constraint_names(self) -> tuple[str, ...]:
@@ -242,6 +242,8 @@ class Problem(checks.FixedAttributes):
         A default of a person, which stood nowhere, is called by its class alone. Constraints that were set afterwards
         are counted as they were set.
         """
+        if not self.constraints:
+            return ()
         defaults = {id(term) for term in self.defaults}
         count = sum(id(term) not in defaults for term in self.constraints)
         places = iter(self._places if len(self._places) == count else range(count))
@@ -355,14 +357,18 @@ class Problem(checks.FixedAttributes):
         Raises:
             InputError: objects were added or removed after the problem was made, or clearances are wrong.
         """
-        if self.scene.revision != self._revision:
-            raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
+        self.check_scene()
         asked, count = self.clearances, len(self.scene.built.table.pairs)
         if asked.shape != (count,):
             raise InputError(f"clearances have shape {asked.shape}; give one for each of the {count} pairs")
         if count and not (np.minimum.reduce(asked) >= 0.0 and np.maximum.reduce(asked) <= CLEARANCE.high):
             wrong = int(np.argmin((asked >= 0.0) & (asked <= CLEARANCE.high)))
             raise InputError(f"clearances[{wrong}] is {asked[wrong]}; give numbers between {CLEARANCE}")
+
+    def check_scene(self) -> None:
+        """Refuse a problem whose scene has other things now, by an InputError."""
+        if self.scene.revision != self._revision:
+            raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
 
     def _clearances(self, goals: tuple[Goal, ...]) -> Array:
         """(pairs,) the clearance of each with these goals, as it follows from what was stated."""

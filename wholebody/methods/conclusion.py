@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wholebody.assessment.posture import Assessment, assess
+from wholebody.assessment.posture import Assessment, judged
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
@@ -54,7 +54,7 @@ def meets(judgement: Assessment, tolerance: float) -> bool:
 
 def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control) -> Solution:
     """The solution of a problem, whose search began with its control."""
-    judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
+    judgement = judged(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
     if control.undefined is not None:
         control.undefined = problem.placed(control.undefined)
