@@ -175,13 +175,15 @@ class Problem(checks.FixedAttributes):
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
         """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
+        if not terms:
+            return ()
         found = (term.resolve(self.scene, self.start) for term in terms)
         key = self.start.tobytes(), *((type(term), *vars(term).values()) for term in terms)
         try:
             hash(key)
         except TypeError:  # arrays and placements
             return tuple(found)
-        return tuple(found) if not terms or any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
+        return tuple(found) if any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
 
     def _usual_constraints(
         self, stated: Sequence[Constraint], stands: tuple[str, ...]
@@ -195,7 +197,7 @@ class Problem(checks.FixedAttributes):
         if not (steady or (ranges and scene.figure.ranges)):
             return (), ""
         moves = bool(steady) * scene.built.moves  # shoes carry too
-        key = "constraints", ranges, steady, required, known, moves, start.tobytes()
+        key = "constraints", ranges, steady, required, known, moves, start.tobytes() if steady else b""
         make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
         return scene.built.known(key, make)
 
@@ -361,8 +363,9 @@ class Problem(checks.FixedAttributes):
         asked, count = self.clearances, len(self.scene.built.table.pairs)
         if asked.shape != (count,):
             raise InputError(f"clearances have shape {asked.shape}; give one for each of the {count} pairs")
-        if count and not (np.minimum.reduce(asked) >= 0.0 and np.maximum.reduce(asked) <= CLEARANCE.high):
-            wrong = int(np.argmin((asked >= 0.0) & (asked <= CLEARANCE.high)))
+        fits = (asked >= 0.0) & (asked <= CLEARANCE.high)
+        if 0 in fits.tobytes():  # in a tenth of the time of a reduction
+            wrong = int(np.argmin(fits))
             raise InputError(f"clearances[{wrong}] is {asked[wrong]}; give numbers between {CLEARANCE}")
 
     def check_scene(self) -> None:
@@ -373,7 +376,8 @@ class Problem(checks.FixedAttributes):
     def _clearances(self, goals: tuple[Goal, ...]) -> Array:
         """(pairs,) the clearance of each with these goals, as it follows from what was stated."""
         built = self.scene.built
-        asked = np.full(len(built.table.pairs), self.clearance)
+        asked = np.empty(len(built.table.pairs))
+        asked.fill(self.clearance)
         brought = [pair for term in (*goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
@@ -403,4 +407,4 @@ def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) 
         return np.array(q)
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
-    return np.array(pin.normalize(scene.model, q))
+    return np.asarray(pin.normalize(scene.model, q), dtype=float)

@@ -160,7 +160,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     short = float(np.maximum.reduce(problem.clearances - pairs.distance, initial=-inf))
     violation = max(0.0, short)
     missed = largest_violation(problem, state)
-    fits = all(left <= MET for left in (distance, angle, violation, missed))
+    fits = distance <= MET and angle <= MET and violation <= MET and missed <= MET
     return Assessment(
         goal_error=distance,
         goal_angle=angle,
@@ -169,7 +169,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         clearance_violation=violation,
         limit_violation=limit_violation(problem.scene.figure, q),
         constraint_violation=missed,
-        measure=sum((one(term, "value", term.weight * term.value(state)) for term in problem.measures), 0.0),
+        measure=sum([one(term, "value", term.weight * term.value(state)) for term in problem.measures], 0.0),
         goal_errors=each,
         first_order=FirstOrder(problem, pairs, fits, short > -2.0 * ACTIVE),
         seconds=time.perf_counter() - began,

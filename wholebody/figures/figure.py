@@ -325,8 +325,10 @@ class Figure(checks.FixedAttributes):
 
     def clamp(self, q: Array) -> Array:
         """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value."""
-        q = self._checked(q).copy()
-        idx_q, _, lower, upper = self.limits
+        q, (idx_q, _, lower, upper) = self._checked(q), self.limits
+        if len(idx_q) == len(q):  # which is in order, as all joints have one degree of freedom and limits
+            return np.minimum(np.maximum(q, lower), upper)
+        q = q.copy()
         q[idx_q] = np.minimum(np.maximum(q[idx_q], lower), upper)
         return q
 

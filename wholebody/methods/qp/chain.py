@@ -357,7 +357,7 @@ def distance_of(problem: Problem, chain: PlainChain) -> SquaredDistance | None:
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
         return None
     distance: SquaredDistance = measures[0].distance  # type: ignore[attr-defined]
-    if not distance.weights[chain.idx_v].all():
+    if np.count_nonzero(distance.weights[chain.idx_v]) < len(chain.idx_v):
         return None
     if len(chain.idx_v) == len(distance.weights):
         return distance
