@@ -10,7 +10,6 @@ from operator import is_
 from typing import Any, TypeVar
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices
@@ -18,13 +17,12 @@ from wholebody.base.charts import listing
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
 from wholebody.base.pool import Loan
-from wholebody.figures.state import UNIT_TOLERANCE, State
-from wholebody.geometry.placement import FARTHEST
+from wholebody.figures.state import State
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.tasks.checks import KINDS, check_frozen, check_own, checked_terms, owner_pair
+from wholebody.tasks.checks import KINDS, check_frozen, check_own, checked_terms, owner_pair, start_posture
 from wholebody.tasks.defaults import alike, balancing, default_constraints, standing, usual_measures
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
@@ -128,7 +126,7 @@ class Problem(checks.FixedAttributes):
             UnknownNameError: a name that the figure or scene does not have.
         """
         scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
-        q = _start(scene, start)
+        q = start_posture(scene, start)
         listed = checked_terms(goals, (Goal,), "goals")
         given = checked_terms(constraints, (Constraint, Bound), "constraints")
         measured = None if measures is None else checked_terms(measures, (Measure,), "measures")
@@ -393,18 +391,3 @@ class Problem(checks.FixedAttributes):
             near = workspace.proximity.query_views(state.data, self.clearance + 1e-9)
             resting = near.distance >= -1e-6
             return near.number[resting], np.maximum(near.distance[resting], 0.0)
-
-
-def _start(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
-    figure = scene.figure
-    if start is None or isinstance(start, (str, Mapping)):
-        return np.array(figure.posture(figure.postures[0] if start is None else start), dtype=float)
-    q = checks.posture(start, scene.model.nq, "start")
-    figure.warn_of_angles(q, "start")
-    if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
-        raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
-    if scene.model.nq == scene.model.nv:
-        return np.array(q)
-    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
-        raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
-    return np.asarray(pin.normalize(scene.model, q), dtype=float)

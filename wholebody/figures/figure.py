@@ -326,11 +326,9 @@ class Figure(checks.FixedAttributes):
     def clamp(self, q: Array) -> Array:
         """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value."""
         q, (idx_q, _, lower, upper) = self._checked(q), self.limits
-        if len(idx_q) == len(q):  # which is in order, as all joints have one degree of freedom and limits
-            return np.minimum(np.maximum(q, lower), upper)
-        q = q.copy()
-        q[idx_q] = np.minimum(np.maximum(q[idx_q], lower), upper)
-        return q
+        within, some = q.copy(), idx_q if len(idx_q) < len(q) else slice(None)  # all are in order
+        within[some] = np.minimum(np.maximum(q[some], lower), upper)
+        return within
 
     def grounded(self, q: Array, scene: Any) -> Array:
         """Return a copy of q (nq,) moved vertically until the lowest segments stand on the things of a scene.

@@ -134,9 +134,10 @@ def _bearing(scene: Surroundings, term: Constraint | Goal) -> tuple[int, ...]:
 
 def _placed(term: Constraint | Goal) -> tuple[int, ...]:
     """Joints of the frames between which a term places one; empty for others."""
-    owner = getattr(term, "residual", term)
-    known = (getattr(owner, "place", None), getattr(owner, "base", None))
-    return tuple(one.joint for one in known if isinstance(one, inputs.Place))
+    own = vars(term)
+    residual = own.get("residual")
+    known = (own.get("place"), own.get("base")) if residual is None else (residual.place, residual.base)
+    return tuple([one.joint for one in known if type(one) is inputs.Place])
 
 
 def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
