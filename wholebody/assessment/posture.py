@@ -178,8 +178,11 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
 
 def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:
     """The largest distance [m] and the largest angle [rad] of goals from their targets, and the larger of each goal."""
-    found = [distance_and_angle(goal, state) for goal in problem.goals]
-    distances, angles = ([error[part] or 0.0 for error in found] for part in (0, 1))
+    distances, angles = list[float](), list[float]()
+    for goal in problem.goals:
+        distance, angle = distance_and_angle(goal, state)
+        distances.append(distance or 0.0)
+        angles.append(angle or 0.0)
     return max(distances, default=0.0), max(angles, default=0.0), tuple(map(max, distances, angles))
 
 

@@ -328,7 +328,7 @@ class Figure(checks.FixedAttributes):
         q, (idx_q, _, lower, upper) = self._checked(q), self.limits
         within, some = q.copy(), idx_q if len(idx_q) < len(q) else slice(None)  # all are in order
         within[some] = np.minimum(np.maximum(q[some], lower), upper)
-        return within
+        return np.asarray(within)
 
     def grounded(self, q: Array, scene: Any) -> Array:
         """Return a copy of q (nq,) moved vertically until the lowest segments stand on the things of a scene.

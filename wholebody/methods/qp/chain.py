@@ -130,6 +130,7 @@ class Descents:
     ) -> None:  # fmt: skip
         self.asked, self.chain, self.workspace, self.settings, self.control = asked, chain, workspace, settings, control
         self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
+        self.within = float(np.maximum.reduce(asked.clearances, initial=0.0))
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
@@ -204,7 +205,8 @@ class Descents:
         if len(found) and self.workspace.model.nv > len(self.start):
             return False  # others may make room
         deep = clearances - SEEDS.deep
-        return not any(is_free(self.workspace, chain.posture(values, at), deep) for values in found)
+        within = max(0.0, self.within - SEEDS.deep)
+        return not any(is_free(self.workspace, chain.posture(values, at), deep, within) for values in found)
 
     def _nearest(self) -> Met:
         """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
@@ -305,7 +307,7 @@ class Descents:
         return float(self.asked.nearest[1].dot(away * away))
 
     def _is_free(self, q: Array) -> bool:
-        return is_free(self.workspace, q, self.asked.clearances)
+        return is_free(self.workspace, q, self.asked.clearances, self.within)
 
 
 def how_far(settings: Settings, enough: int, others: bool = False) -> Array:
@@ -345,9 +347,9 @@ class Rule(NamedTuple):
         return cls(guided, held, finite, enough, rows_of(goals), SEEDS.together * more, measured, nearly)
 
 
-def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
-    """Whether every pair keeps its clearance (pairs,) at a posture (nq,)."""
-    near = workspace.near_views(q, float(np.maximum.reduce(clearances, initial=0.0)))
+def is_free(workspace: Workspace, q: Array, clearances: Array, within: float) -> bool:
+    """Whether every pair keeps its clearance (pairs,), at most `within` metres, at a posture (nq,)."""
+    near = workspace.near_views(q, within)
     return not len(near.number) or not (near.distance < clearances[near.number]).any()
 
 
