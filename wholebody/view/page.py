@@ -6,6 +6,7 @@ import base64
 import gzip
 import html
 import importlib.util
+import json
 import re
 import sys
 from collections.abc import Iterable
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.errors import MissingPackageError
+from wholebody.view.commands import contact_paint
 from wholebody.view.server import Command, bundle
 
 
@@ -75,7 +77,8 @@ def player() -> str:
 
 def picture_page() -> str:
     """HTML of an empty page for `Screenshots`: it gets its commands from outside, and draws only when asked to."""
-    return _page("wholebody", _script(_meshcat_script()) + _script(_file("page.js")), " data-still")
+    still = html.escape(json.dumps(contact_paint()), quote=True)
+    return _page("wholebody", _script(_meshcat_script()) + _script(_file("page.js")), f' data-still="{still}"')
 
 
 def _page(title: str, parts: str, still: str = "") -> str:
