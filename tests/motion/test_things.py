@@ -363,3 +363,9 @@ def test_people_of_other_sizes_sit_on_the_seat_of_the_recording(stature: float) 
     ]
     assert seat  # the pelvis or the thighs are on it
     assert np.ptp(clip.q[:, :3], axis=0).max() < 1e-3
+
+
+def test_a_scene_of_several_figures_is_refused_with_what_to_do(human: wb.Figure) -> None:
+    scene = wb.Scene({"ann": human, "ben": (human, (1.0, 0.0, 0.0))})
+    with pytest.raises(wb.InputError, match=r"the scene has several figures; leave it out.*posture\(\{'ann': q"):
+        wb.retarget(lifting(4)[0], human, scene)
