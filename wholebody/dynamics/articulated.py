@@ -150,7 +150,7 @@ class Articulated:
         drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
         after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        first, last = (points.figure @ (0.5 * both) for both in (start + begin, unborne + after))
+        first, last = (points.figure @ (0.5 * both) for both in (start + begin, 2.0 * after))
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
@@ -296,7 +296,7 @@ class Articulated:
                 part = points.things[:, 6 * b : 6 * b + 6]
                 mobility += part @ self._engine.response(name) @ part.T
         after = speed.copy()
-        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 100, 1e-7)
+        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 1000, 1e-7)
         flat = impulse.ravel()
         gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all

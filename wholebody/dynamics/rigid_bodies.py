@@ -246,7 +246,9 @@ class RigidBodies:
         state = self.state
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
-        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
+        # what pushes bear has the weight of the step against it: without that it would seem to rise
+        ahead = np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0])
+        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, ahead)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
         falling = self._falling & ~self._borne

@@ -60,8 +60,12 @@ class StepProgram:
         residuals: Signorini's and Coulomb's, m/s.
     """
 
-    def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints) -> None:
+    def __init__(
+        self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints, ahead: Array | float = 0.0
+    ) -> None:
+        """Read the present velocities; `ahead` (n, 6) is the part of the step's weight that impacts have to count."""
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
+        self._ahead = ahead
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
@@ -76,7 +80,7 @@ class StepProgram:
     def read_velocities(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
         bodies, normal = self.points.bodies, self.points.normal
-        self.speed = self._rates(self.state.bodies.twist)[: len(normal), 0]
+        self.speed = self._rates(self.state.bodies.twist + self._ahead)[: len(normal), 0]
         fall = (self.state.bodies.moving & falling).astype(float)
         self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
         self.hits = impact_times(self.points.gap - SKIN, self.speed, self._pull)
@@ -135,13 +139,13 @@ class StepProgram:
         state, points = self.state, self.points
         weighed = state.bodies.given & np.isfinite(state.pieces.mass)
         rows = self._point_rows(state.bodies.moving | weighed) if weighed.any() else self._rows
-        twist, events = state.bodies.twist.copy(), np.zeros((1000, 5))
+        twist, events = state.bodies.twist + self._ahead, np.zeros((1000, 5))
         laws = Laws(self._friction, np.zeros(len(points.gap)), np.zeros((len(self.joints), 3)))
         count, ended = impact_kernel.resolve(
             np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
             events,
         )  # fmt: skip
-        state.bodies.twist[state.bodies.moving] = twist[state.bodies.moving]
+        state.bodies.twist[state.bodies.moving] = (twist - self._ahead)[state.bodies.moving]
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
