@@ -246,10 +246,8 @@ class RigidBodies:
         state = self.state
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
-        # what pushes bear has the weight of the step against it: without that it would seem to rise
-        ahead = np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0])
-        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, ahead)
-        events, ended = program.resolve_impacts()
+        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
+        events, ended = program.resolve_impacts(np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0]))
         self._record(events, program, record)
         falling = self._falling & ~self._borne
         program.read_velocities(falling)

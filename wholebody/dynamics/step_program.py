@@ -60,12 +60,8 @@ class StepProgram:
         residuals: Signorini's and Coulomb's, m/s.
     """
 
-    def __init__(
-        self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints, ahead: Array | float = 0.0
-    ) -> None:
-        """Read the present velocities; `ahead` (n, 6) is the part of the step's weight that impacts have to count."""
+    def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints) -> None:
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
-        self._ahead = ahead
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
@@ -80,7 +76,7 @@ class StepProgram:
     def read_velocities(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
         bodies, normal = self.points.bodies, self.points.normal
-        self.speed = self._rates(self.state.bodies.twist + self._ahead)[: len(normal), 0]
+        self.speed = self._rates(self.state.bodies.twist)[: len(normal), 0]
         fall = (self.state.bodies.moving & falling).astype(float)
         self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
         self.hits = impact_times(self.points.gap - SKIN, self.speed, self._pull)
@@ -132,20 +128,25 @@ class StepProgram:
         # what bears a body is known to the next points that join the step
         self.impulse = inserted(self.impulse, np.zeros((len(gap), 3)))
 
-    def resolve_impacts(self) -> tuple[Array, bool]:
-        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left."""
-        if not (self._touching & (self.speed < -SLOW)).any():
+    def resolve_impacts(self, ahead: Array) -> tuple[Array, bool]:
+        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.
+
+        `ahead` (n, 6) is what weight adds during the step to bodies that pushes gave its opposite: without it they
+        would seem to rise, and to meet what lies on them.
+        """
+        twist = self.state.bodies.twist + ahead
+        if not (self._touching & (self._rates(twist)[: len(self.speed), 0] < -SLOW)).any():
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
         weighed = state.bodies.given & np.isfinite(state.pieces.mass)
         rows = self._point_rows(state.bodies.moving | weighed) if weighed.any() else self._rows
-        twist, events = state.bodies.twist + self._ahead, np.zeros((1000, 5))
+        events = np.zeros((1000, 5))
         laws = Laws(self._friction, np.zeros(len(points.gap)), np.zeros((len(self.joints), 3)))
         count, ended = impact_kernel.resolve(
             np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
             events,
         )  # fmt: skip
-        state.bodies.twist[state.bodies.moving] = (twist - self._ahead)[state.bodies.moving]
+        state.bodies.twist[state.bodies.moving] = (twist - ahead)[state.bodies.moving]
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
