@@ -55,3 +55,19 @@ def test_a_slow_ball_and_a_rod_in_the_air_go_on_together(tmp_path: Path) -> None
     assert engine.twist("ball")[2] == pytest.approx(-speed + impulse / mass, rel=3e-4)
     assert moving.velocity[[2, 4]] == pytest.approx((-impulse / 2.0, arm * impulse / 0.2), rel=3e-4)
     assert engine.momentum() + moving.momentum() == pytest.approx(began, abs=1e-12)
+
+
+def test_a_limp_rod_lies_still_on_boxes_that_weigh_less(tmp_path: Path) -> None:
+    (tmp_path / "rod.urdf").write_text(ROD)
+    rod = wb.load(tmp_path / "rod.urdf", root="free")
+    scene, start = wb.Scene(rod).add(wb.HalfSpace(), name="floor"), rod.neutral.copy()
+    for k, x in enumerate((-0.4, 0.3)):
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name=f"box {k}", at=(x, 0.0, 0.0501), body=wb.Body(mass=0.2))
+    start[2] = 0.1105
+    world = wb.World(scene, start, spring=wb.Actuated(rod, stiffness=0.0, damping=0.0))
+    frames = [world.step() for _ in range(40)]
+    assert np.abs(world.velocity).max() < 1e-4
+    for frame in frames[-10:]:
+        assert frame.engine is not None
+        assert not frame.engine.events  # the rod threw its boxes down and was thrown up, eight times a frame
+    assert frames[-1].q[2] == pytest.approx(frames[-10].q[2], abs=1e-7)
