@@ -141,17 +141,18 @@ class Articulated:
             self.velocity = np.linalg.solve(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
-        unborne = self.velocity
+        unborne, sprung = self.velocity, self.stiffness > 0.0
         bearing = self._bear(driven, points, time)
-        impulse = blow + bearing
+        impulse, after = blow + bearing, self.velocity
         drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
-        after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        first, last = (points.figure @ (0.5 * both) for both in (start + begin, unborne + after))
+        ways = start + begin, np.where(sprung, after, unborne) + after
+        first, last = (points.figure @ (0.5 * both) for both in ways)
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
-        # springs and contacts are implicit; what is free of them moves by the mean of both velocities
-        moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
-        paid = float(motor @ moves) + float(work[points.driven].sum())
+        # springs and contacts are implicit; what is free of them moves by the mean of both velocities, and limp
+        # freedoms are paid for the fall that contacts prevent
+        moves = time * np.where(sprung | bearing.any(), after, mean)
+        paid = float(motor @ moves + work[points.driven].sum() + (weight - borne) @ (moves - time * mean))
         motions = self._move(moves, segments, drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
@@ -268,9 +269,7 @@ class Articulated:
         target = np.where(hit, -points.restitution * approach, -np.inf)
         touching = points.gap <= 2.0 * SKIN
         target = np.where(touching & ~hit, 0.0, target)  # what is pressed together passes the blow on
-        if not hit.any():
-            return np.zeros((len(target), 3))
-        return self._solved(inertia, points, speed, target, True)
+        return self._solved(inertia, points, speed, target, True) if hit.any() else np.zeros((len(target), 3))
 
     def _bear(self, inertia: Array, points: Points, time: float) -> Array:
         """Keep points apart at the end of a step; the impulses (m, 3)."""
@@ -294,7 +293,7 @@ class Articulated:
                 part = points.things[:, 6 * b : 6 * b + 6]
                 mobility += part @ self._engine.response(name) @ part.T
         after = speed.copy()
-        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 100, 1e-7)
+        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 1000, 1e-7)
         flat = impulse.ravel()
         gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
