@@ -11,7 +11,6 @@ import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache, wraps
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, ClassVar
@@ -32,11 +31,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from wholebody.base.errors import WholebodyError
-from wholebody.figures import hand as hand_room
 from wholebody.figures import load
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
-from wholebody.figures.human import figure as human_room
 from wholebody.figures.surface import making, surface
 from wholebody.figures.surface.fields import Field
 from wholebody.figures.surface.nets import Triangles, triangles
@@ -264,38 +261,6 @@ def coarse_surfaces(request: pytest.FixtureRequest, tmp_path_factory: pytest.Tem
         yield
         if fine:
             surface._kept.cache_clear()
-
-
-@pytest.fixture(autouse=True, scope="module")
-def kept_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Let people and hands of the same options be one figure within a module: figures do not change.
-
-    To make a person, and what scenes keep of it, takes 20 ms. A module that is about figures being made anew sets
-    ``FRESH_FIGURES = True``.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        if not getattr(request.module, "FRESH_FIGURES", False):
-            for module, name in (
-                (human_room, "human_figure"),
-                (human_room, "avatar_figure"),
-                (hand_room, "hand_figure"),
-            ):
-                patch.setattr(module, name, _kept(getattr(module, name)))
-        yield
-
-
-def _kept(make: Callable[..., Figure]) -> Callable[..., Figure]:
-    known = lru_cache(maxsize=8, typed=True)(make)
-
-    @wraps(make)
-    def made(**options: Any) -> Figure:
-        try:
-            hash(tuple(options.values()))
-        except TypeError:
-            return make(**options)
-        return known(**options)
-
-    return made
 
 
 def _coarse_triangles(field: Field, low: Any, high: Any, cell: float, cuts: Sequence[Field] = ()) -> Triangles:
