@@ -39,7 +39,8 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
     last, calm = np.inf, 0
     for sweep in range(most):
         largest, square = 0.0, 0.0
-        before[:] = impulse
+        for c in range(count):
+            before[c, 0], before[c, 1], before[c, 2] = impulse[c, 0], impulse[c, 1], impulse[c, 2]
         for number in range(count):
             c = number if sweep % 2 == 0 else count - 1 - number
             row = 3 * c
