@@ -202,60 +202,6 @@ def test_a_robot_without_pieces_at_its_wrists_keeps_these_at_a_box(radius: float
     assert wb.check(clip, scene).free
 
 
-def hand_distance(clip: wb.Clip, ends: str) -> np.ndarray:
-    """(n,) distance of the pieces of one hand to those of the other, by coal."""
-    figure, found = clip.figure, []
-    data, placed = figure.model.createData(), figure.geometry.createData()
-    joints = [figure.model.frames[figure.frame_id(f"{side}_{ends}")].parentJoint for side in ("left", "right")]
-    for q in clip.q:
-        pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
-        left, right = (
-            [
-                (piece.geometry, coal.Transform3s(at.rotation, at.translation))
-                for piece, at in zip(figure.geometry.geometryObjects, placed.oMg, strict=True)
-                if joint in figure.model.supports[piece.parentJoint]
-            ]
-            for joint in joints
-        )
-        found.append(
-            min(
-                coal.distance(*one, *other, coal.DistanceRequest(), coal.DistanceResult())
-                for one in left
-                for other in right
-            )
-        )
-    return np.array(found)
-
-
-@pytest.mark.parametrize("stature", [1.5, None])
-def test_hands_that_meet_in_the_recording_meet(stature: float | None, tmp_path: Path) -> None:
-    """Hands of a person of 1.75 m are 5 cm apart, as palms that touch are; those of others touch, a robot's too."""
-    low, high = 0.0, 1.2
-    while high - low > 1e-6:  # how far the arms, which point forward, are turned inward
-        motion = person(12)
-        local = np.tile(np.eye(3), (12, len(motion.names), 1, 1))
-        for side, sign in (("left", 1.0), ("right", -1.0)):
-            local[:, motion.names.index(f"{side}_shoulder")] = pin.utils.rotate("z", -sign * 0.5 * (np.pi + low + high))
-        root = np.tile([0.0, 0.0, 0.94], (12, 1))
-        motion = SkeletonMotion.moved(motion.names, motion.parents, motion.offsets, local, root, 1 / 30, "meeting")
-        motion = with_hands(motion)
-        hands = [
-            motion.positions[:, [motion.names.index(f"{side}_{part}") for part in ("wrist", "hand")]].mean(axis=1)
-            for side in ("left", "right")
-        ]
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if (hands[0] - hands[1])[0, 1] > 0.05 else (low, middle)
-    figure = robot(tmp_path) if stature is None else wb.load("human", stature=stature)
-    clip = wb.retarget(motion, figure)
-    apart = hand_distance(clip, "wrist_yaw" if stature is None else "hand")
-    assert apart.min() > 0.0
-    assert apart.max() < 1e-3
-    assert wb.check(clip).colliding == 0
-    assert np.ptp(clip.q[:, :3], axis=0).max() < 5e-3  # who stands still in the recording does so
-    alone = hand_distance(wb.retarget(motion, figure, ground=None), "wrist_yaw" if stature is None else "hand")
-    assert np.abs(alone).min() > 2e-3
-
-
 def test_the_thickness_of_a_part_whose_pieces_lie_beside_each_other() -> None:
     """A ball about the start, and one beyond it that one way passes at a distance and another one goes through."""
     pieces = [
@@ -392,3 +338,9 @@ def test_people_of_other_sizes_sit_on_the_seat_of_the_recording(stature: float) 
     ]
     assert seat  # the pelvis or the thighs are on it
     assert np.ptp(clip.q[:, :3], axis=0).max() < 1e-3
+
+
+def test_a_scene_of_several_figures_is_refused_with_what_to_do(human: wb.Figure) -> None:
+    scene = wb.Scene({"ann": human, "ben": (human, (1.0, 0.0, 0.0))})
+    with pytest.raises(wb.InputError, match=r"the scene has several figures; leave it out.*posture\(\{'ann': q"):
+        wb.retarget(lifting(4)[0], human, scene)

@@ -27,10 +27,7 @@ NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole betwee
 TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
-FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
-FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
-LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
 OVER = 0.2  # s: in which a point goes over to where it rests
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
 
@@ -139,7 +136,8 @@ class Holds:
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
             normal, gap, off = self._met(number, stand, frame, q, places, held[0])
-            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > LOST:
+            # m: points farther than this from their place on a thing cannot reach it
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > 0.02:
                 held[1][number] = 0.0
                 self._gone.add((number, frame))
         return any(each[1] == frame for each in self._gone)
@@ -293,7 +291,8 @@ class Holds:
             back, left, right, front = places[own[:4]]
             (x, y, z), (u, v, w) = (front - back).tolist(), (left - right).tolist()
             up = x * v - y * u  # of the normal, the cross product of both
-            found[own] = up > FACING * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
+            # least cosine of the angle from up to the normal of a sole that faces the ground
+            found[own] = up > 0.3 * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
         return found
 
     def landed(self, frame: int, places: Array, held: tuple[Array, Array], span: int) -> None:
@@ -324,7 +323,8 @@ class Holds:
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))
-        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + FOLLOW * shift
+        # a new place keeps this share of the body's shift; the rest goes back with time
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.8 * shift
         point = self.points[number]
         if point.edge:
             place[2] = self._height(place, stand)

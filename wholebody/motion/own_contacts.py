@@ -33,7 +33,6 @@ BODY = {
 HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
 SLACK = 0.02  # m: farther away than that by more than this nothing is touched: hands that swing past hips do not
 ARM = ("shoulder", "elbow", "wrist", "hand")
-OUTSIDE = 0.1  # m: so far outside of a part the nearest place on it is on the side that the hand came from
 
 
 def hand_shares(joints: Mapping[str, str]) -> dict[str, float]:
@@ -116,7 +115,8 @@ def own_contacts(
         base = min(near, key=lambda joint: near[joint]) if other is None else other.joint
         start = here if other is None else data.oMi[base].act(other.place)
         if base in pieces:
-            _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + OUTSIDE * rest.normal))
+            # m: so far outside of a part, the nearest place on it is on the side that the hand came from
+            _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + 0.1 * rest.normal))
         else:
             place = data.oMi[base].actInv(start + 0.5 * HAND * rest.normal)
             normal = data.oMi[base].rotation.T @ rest.normal

@@ -36,7 +36,6 @@ PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
 LEAST_LEVER = 0.1  # m
 WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
-ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
 TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the program digits
@@ -83,7 +82,9 @@ class Fitter:
         self._place_joints = np.array([joint for joint, _ in points], dtype=np.intp)
         self._local = np.array([place for _, place in points]).reshape(-1, 3)
         self._bases = np.array([point.base for point in layout.held], dtype=np.intp)
-        bearing = {joint for piece in figure.geometry.geometryObjects for joint in self.model.supports[piece.parentJoint]}
+        bearing = {
+            joint for piece in figure.geometry.geometryObjects for joint in self.model.supports[piece.parentJoint]
+        }
         bare = [bool(point.thing) and point.joint not in bearing for point in layout.held]
         self._bare = np.repeat(np.array(bare, dtype=bool), 3)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
@@ -310,7 +311,8 @@ def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure,
     weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
     if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
         rows.append(place["hips"])
-        weights.append(ANCHOR)
+        # of the place of the hips; 1 is that of a bone
+        weights.append(0.3)
     else:  # what is known says where it is
         rows += [place[role] for role in points]
         weights += [1.0] * len(points)

@@ -29,7 +29,6 @@ SHARES = (1.0, 0.5, 0.0)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
 
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
-THICKEST = 0.25  # m: of a part from its joint to its skin
 
 
 class ThingContact(NamedTuple):
@@ -178,7 +177,8 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
     last = 0.0
     for piece in pieces:
         where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
-        while far < THICKEST:  # advances by the distance to the surface, inside and outside, so it misses no thick part
+        # m: from the joint of the thickest part to its skin
+        while far < 0.25:  # advances by the distance to the surface, inside and outside, so it misses no thick part
             center = coal.Transform3s(np.eye(3), start + far * along)
             # a result that is used again keeps the least distance of all
             gap = float(coal.distance(ball, center, piece.geometry, where, request, coal.DistanceResult()))
