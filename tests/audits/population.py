@@ -19,7 +19,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.files import packaged_table, write
 from wholebody.figures.anthropometry import make_person
-from wholebody.figures.population import Population
+from wholebody.figures.population import Population, odds
 from wholebody.figures.tables import FOLDER, keyed, table
 
 DIMENSIONS = {
@@ -66,6 +66,9 @@ DIMENSIONS = {
 SCALE = {"mass": 0.1, "age": 1.0}
 """Of the columns that are not in millimetres."""
 
+ENDS = {"age": (16.5, 59.0)}
+"""Ends of the dimensions that have some: the ages measured are 17 to 58 completed years."""
+
 ARMS = {
     "shoulder_top": (0.02, 0.02, 0.004, "acromion above the shoulder joint; de Leva 1996b"),
     "upper_arm": (0.165, 0.165, 0.012, "shoulder to elbow joint"),
@@ -97,16 +100,20 @@ def estimated(columns: Mapping[str, Array]) -> list[list[str]]:
     from scipy.stats import boxcox_normmax
 
     rows, deviates = [], []
-    for name, x in columns.items():
+    for name, measured in columns.items():
+        low, high = ENDS.get(name, (0.0, np.inf))
+        x = odds(measured, low, high)
         # Exponents beyond these put the end of the distribution near people.
         power = round(float(np.clip(boxcox_normmax(x / np.median(x), method="mle"), -2.0, 3.0)), 3)
         centre = float(np.exp(np.log(x).mean())) if power == 0.0 else float((x**power).mean() ** (1.0 / power))
         ratio = x / centre
         plain = np.log(ratio) if power == 0.0 else (ratio**power - 1.0) / power
-        rows.append([name, DIMENSIONS[name], f"{centre:.6g}", f"{power:g}", f"{plain.std():.6g}"])
+        rows.append(
+            [name, DIMENSIONS[name], f"{low:g}", f"{high:g}", f"{centre:.6g}", f"{power:g}", f"{plain.std():.6g}"]
+        )
         deviates.append(plain)
     correlation = np.corrcoef(deviates)
-    heading = ["name", "ansur", "centre", "exponent", "spread", *columns]
+    heading = ["name", "ansur", "low", "high", "centre", "exponent", "spread", *columns]
     return [
         heading,
         *([*row, *(f"{value:.4f}" for value in line)] for row, line in zip(rows, correlation, strict=True)),

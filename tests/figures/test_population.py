@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.audits.population import people
 from wholebody.figures.population import population
 
 NAMES = {
@@ -47,6 +48,29 @@ def test_quantiles_are_those_of_all_people(sex: str) -> None:
         for share, value in values.items():
             found = population(sex).quantile(name, share)
             assert found == pytest.approx(value, abs=0.15 * deviation), (name, share)
+
+
+@pytest.mark.parametrize("sex", ["male", "female"])
+def test_a_sample_has_the_tails_of_people_kept_back(sex: str, shared_data: Path) -> None:
+    path = shared_data.parent / "human" / "ansur2.csv"
+    if not path.exists():
+        pytest.skip("needs the table of ANSUR II, which is not in the project")
+    drawn, kept = population(sex).sample(2048, np.random.default_rng(5)), people(path, True)[sex]
+    for name, column in kept.items():
+        found = np.quantile([one[name] for one in drawn], (0.01, 0.05, 0.5, 0.95, 0.99))
+        off = (found - np.quantile(column, (0.01, 0.05, 0.5, 0.95, 0.99))) / column.std()
+        # Three standard errors of the percentiles of 372 normal people are 0.6, 0.33 and 0.2 standard deviations.
+        assert (np.abs(off) <= (0.6, 0.33, 0.2, 0.33, 0.6)).all(), (name, off)
+
+
+@pytest.mark.parametrize("sex", ["male", "female"])
+def test_nobody_is_older_or_younger_than_the_table(sex: str) -> None:
+    ages = [one["age"] for one in population(sex).sample(8192, np.random.default_rng(6))]
+    assert 16.5 <= min(ages) < 18.0
+    assert 54.0 < max(ages) < 59.0
+    # Older than anybody in the table is what the oldest are, not what a trend would make of them.
+    waists = [population(sex).likely({"stature": 1.7, "mass": 75.0, "age": age})["waist_depth"] for age in (59.0, 69.0)]
+    assert waists[0] == waists[1]
 
 
 def test_what_is_likely_is_the_regression_on_what_is_given() -> None:

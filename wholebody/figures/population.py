@@ -1,9 +1,10 @@
 """The joint distribution of the dimensions of men and of women.
 
 Of each dimension x, ``z = (((x / centre)^exponent - 1) / exponent) / spread`` is a normal deviate (Box and Cox 1964;
-the logarithm where the exponent is 0), and the deviates of one person have a joint normal distribution with the
-correlations of the tables "population_male" and "population_female". `tests.audits.population` estimates them from
-ANSUR II.
+the logarithm where the exponent is 0). Of a dimension that has ends, x is the odds
+``(x - low) (high - low) / (high - x)``, which with the exponent 0 is a bounded distribution of Johnson (1949). The
+deviates of one person have a joint normal distribution with the correlations of the tables "population_male" and
+"population_female". `tests.audits.population` estimates them from ANSUR II.
 
 What is likely, given some dimensions, is the conditional mean of the deviates (Eaton 1983, "Multivariate Statistics",
 section 3.4).
@@ -26,6 +27,10 @@ SEXES = {"male": "men", "female": "women"}
 UNITS = {"mass": "kg", "age": "years"}
 """Units of the dimensions that are not lengths."""
 
+NEAR = 2.0
+"""Years from an end of the ages. Few were measured nearer to it and nobody beyond it: they have the dimensions of those
+at this distance."""
+
 RARE = 1e-6
 """Share of people by the normal distribution: who differs more from those of the same stature and mass is nobody. Its
 tails are thinner than people's, of whom up to one in 200 would differ by more than one in 16,000 does."""
@@ -33,6 +38,16 @@ tails are thinner than people's, of whom up to one in 200 would differ by more t
 RANKED = 50
 """People of a sample from which on each dimension has the shares of all people; of fewer, ranks would tear apart
 dimensions that go together."""
+
+
+def odds(x: Array, low: Array | float, high: Array | float) -> Array:
+    """Return the odds of values between two ends; of ends 0 and infinity, the values.
+
+    Of a value nearer to a finite end than `NEAR`, or beyond it, those of that distance from the end.
+    """
+    inner = NEAR * np.isfinite(high)
+    above = np.clip(x, low + inner, high - inner) - low
+    return np.asarray(above / (1.0 - above / (high - low)))
 
 
 class Population:
@@ -49,14 +64,15 @@ class Population:
         self.sex = sex
         self.names = tuple(row["name"] for row in rows)
         self.correlation = np.array([[float(row[name]) for name in self.names] for row in rows])
-        self._centre, self._exponent, self._spread = (
-            np.array([float(row[column]) for row in rows]) for column in ("centre", "exponent", "spread")
+        self._low, self._high, self._centre, self._exponent, self._spread = (
+            np.array([float(row[column]) for row in rows]) for column in ("low", "high", "centre", "exponent", "spread")
         )
 
     def deviates(self, values: Mapping[str, float]) -> tuple[list[int], Array]:
         """Return the indices (k,) of some dimensions, and their normal deviates (k,)."""
         which = [self.names.index(name) for name in values]
-        ratio = np.array(list(values.values()), dtype=float) / self._centre[which]
+        low, high = self._low[which], self._high[which]
+        ratio = odds(np.array(list(values.values()), dtype=float), low, high) / self._centre[which]
         power = self._exponent[which]
         plain = np.where(power == 0.0, np.log(ratio), (ratio**power - 1.0) / np.where(power == 0.0, 1.0, power))
         return which, plain / self._spread[which]
@@ -67,7 +83,9 @@ class Population:
         # Beyond the end of a distribution, eight standard deviations away or more, its end.
         base = np.maximum(1.0 + power * plain, 1e-3)
         ratio = np.where(power == 0.0, np.exp(plain), base ** (1.0 / np.where(power == 0.0, 1.0, power)))
-        return dict(zip(self.names, map(float, self._centre * ratio), strict=True))
+        found = self._centre * ratio
+        found = self._low + found / (1.0 + found / (self._high - self._low))
+        return dict(zip(self.names, map(float, found), strict=True))
 
     def likely(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return all dimensions of those who have some of them: these, and the conditional mean of the others."""
