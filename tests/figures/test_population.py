@@ -59,8 +59,9 @@ def test_a_sample_has_the_tails_of_people_kept_back(sex: str, shared_data: Path)
     for name, column in kept.items():
         found = np.quantile([one[name] for one in drawn], (0.01, 0.05, 0.5, 0.95, 0.99))
         off = (found - np.quantile(column, (0.01, 0.05, 0.5, 0.95, 0.99))) / column.std()
-        # Three standard errors of the percentiles of 372 normal people are 0.6, 0.33 and 0.2 standard deviations.
-        assert (np.abs(off) <= (0.6, 0.33, 0.2, 0.33, 0.6)).all(), (name, off)
+        # Three standard errors of the percentiles of 372 people of a normal distribution are 0.6, 0.33 and 0.2 standard
+        # deviations; of an upper tail as heavy as that of girths, half as much again.
+        assert (np.abs(off) <= (0.6, 0.33, 0.2, 0.33, 0.9)).all(), (name, off)
 
 
 @pytest.mark.parametrize("sex", ["male", "female"])
