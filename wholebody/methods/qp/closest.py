@@ -141,6 +141,7 @@ class ReachTrials(NamedTuple):
 
     out_of_reach: bool  # whether enough of them rest at the same distance
     reached: Array | None  # (nq,) where one from another start than the first reaches them
+    nearest: LocalSolution | None  # the end that is nearest; None where no end counts
     spent: int  # programs
 
 
@@ -158,14 +159,18 @@ def reach_trials(
         spent += local.iterations
         met = local.violation.worst <= reach.tolerance
         if met or reach.shared.control.over:
-            return ReachTrials(False, local.q if met and number else None, spent)
+            return ReachTrials(False, local.q if met and number else None, _nearest(ends), spent)
         if local.violation.hold > SEARCH.held * local.violation.left:
             continue  # from there the constraints alone are too far
         ends.append(local)
         most = SEARCH.agree * min(nearest, *(end.violation.total for end in ends)) + tolerance
         if sum(end.violation.total <= most for end in ends) == agreeing:
-            return ReachTrials(True, None, spent)
-    return ReachTrials(False, None, spent)
+            return ReachTrials(True, None, _nearest(ends), spent)
+    return ReachTrials(False, None, _nearest(ends), spent)
+
+
+def _nearest(ends: Iterable[LocalSolution]) -> LocalSolution | None:
+    return min(ends, key=lambda end: end.violation.total, default=None)
 
 
 def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:

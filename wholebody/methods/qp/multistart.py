@@ -58,8 +58,9 @@ class Multistart:
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
-        # Through things: least violation of a relaxed probe, so near come the goals, and measures where they are met.
-        self._nearest_through, self._through_measure = np.inf, 0.0
+        # Through things: the end that came nearest to the goals, and measures where they are met.
+        self._near: LocalSolution | None = None
+        self._through_measure = 0.0
         self.out_of_reach = False  # as it seems
         self._best: LocalSolution | None = None
 
@@ -155,7 +156,7 @@ class Multistart:
         self.spent += found.spent
         self.tried += found.tried
         self.trace += found.trace
-        self.out_of_reach = found.out_of_reach
+        self.out_of_reach, self._near = found.out_of_reach, found._near
         if found.best is begin and begin.violation.worst > self.settings.tolerance:
             return None
         return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
@@ -190,7 +191,7 @@ class Multistart:
         """Feasibility with pairs relaxed by a depth, then with the true clearances; None where out of reach."""
         most, relaxed = self._at_most(SEARCH.probe_programs), self.lineariser.relaxed(SEARCH.start_depth)
         through = self._ran(self._feasibility(relaxed, most, note), start)
-        self._nearest_through = min(self._nearest_through, through.violation.total)
+        self._came_near(through)
         if through.violation.worst > SEARCH.reached * self.settings.tolerance:
             return None
         return self._ran(self._feasibility(self.lineariser, most, note), through.q)
@@ -206,7 +207,7 @@ class Multistart:
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         relaxed = self._probe(start, SEARCH.relaxation_depth)
-        self._nearest_through = min(self._nearest_through, relaxed.violation.total)
+        self._came_near(relaxed)
         if relaxed.violation.worst > SEARCH.reached * self.settings.tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
@@ -303,11 +304,18 @@ class Multistart:
         shared = with_values(self._shared, lineariser=lineariser)
         return Feasibility(shared, self.settings.tolerance, most, note, figure=self.problem.scene.figure)
 
+    def _came_near(self, local: LocalSolution | None) -> None:
+        """Keep the end that came nearest to the goals through things."""
+        if local is not None and (self._near is None or local.violation.total < self._near.violation.total):
+            self._near = local
+
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""
         tolerance = self.settings.tolerance
         if self.control.over:
             return
+        if self._near is not None and SEARCH.agree * self._near.violation.total < self.best.violation.total:
+            self._accept(self._ran(self._closest(), self._probe(self._near.q, 0.0).q), self.how)
         if self.out_of_reach:
             local = self._ran(self._closest(), self.best.q)
             if not held(local, tolerance) and local.violation.total < self.best.violation.total:
@@ -340,9 +348,11 @@ class Multistart:
         enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
-        found = reach_trials(reach, starts, self._nearest_through, agreeing, self.settings.tolerance)
+        nearest = np.inf if self._near is None else self._near.violation.total
+        found = reach_trials(reach, starts, nearest, agreeing, self.settings.tolerance)
         self.spent += found.spent
         self._through = [] if found.reached is None else [found.reached]
+        self._came_near(found.nearest)
         return found.out_of_reach
 
     def _closest_from_best(self) -> None:
