@@ -423,6 +423,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
     yield "Problem.with_start", Call(ask.with_start, {"q": q}, wb.solve)
     yield "Problem.check_fresh", Call(ask.check_fresh, {})
+    yield "Problem.check_scene", Call(ask.check_scene, {})
     workspace = ask.workspace()
     yield "Problem.lineariser", Call(lambda dt: ask.lineariser(workspace, dt), {"dt": 0.1})
     yield "Problem.borrow", Call(ask.borrow, {})

@@ -185,7 +185,13 @@ def test_a_problem_is_tied_to_the_things_it_was_stated_with(scene):
     problem = wb.Problem(scene, goals=[GOAL])
     scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))
     moved = partial(problem.retarget, [wb.Touch("right_palm", "floor")])
-    for ask in (problem.check_fresh, problem.workspace, lambda: wb.assess(problem, problem.start), moved):
+    for ask in (
+        problem.check_fresh,
+        problem.check_scene,
+        problem.workspace,
+        lambda: wb.assess(problem, problem.start),
+        moved,
+    ):
         with pytest.raises(wb.InputError, match="state the problem anew"):
             ask()
     again = wb.Problem(scene, goals=[GOAL])

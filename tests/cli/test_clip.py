@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.motion.files.test_formats import glb
 from tests.motion.test_things import SIZE, among, gaps, lifting
 from wholebody import view
 from wholebody.cli import main
@@ -31,6 +32,28 @@ def test_info_tells_size_and_what_moves(walk: Path, capsys: pytest.CaptureFixtur
     assert "frames beyond joint limits: 0" in said
     row = next(line for line in said.splitlines() if line.startswith("left_elbow_flexion")).split()
     assert row[1:] == ["10", "deg", "120", "deg", "200", "deg/s"]
+
+
+def test_clips_of_several_figures_are_read_with_their_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    task, clip, out = tmp_path / "two.toml", tmp_path / "two.npz", tmp_path / "two.csv"
+    task.write_text(
+        '[[figure]]\nname = "human"\ncalled = "ann"\n[[figure]]\nname = "hand"\ncalled = "by"\nat = [2.0, 0.0, 1.0]\n'
+        '[[object]]\nname = "table"\nshape = "box"\nsize = [0.2, 0.2, 0.2]\nat = [1.0, 0.0, 0.1]\n'
+    )
+    figure = wb.read_task(task).problem.scene.figure
+    q = np.tile(figure.neutral, (12, 1))
+    q[:, figure.model.joints[figure.joint_id("ann/left_elbow_flexion")].idx_q] = np.radians(
+        np.linspace(10.0, 120.0, 12)
+    )
+    wb.Clip(figure, q, 0.05).write(clip)
+    assert main(["clip", "info", str(clip), "--scene", str(task)]) == 0
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("ann/left_elbow")).split()
+    assert row[1:] == ["10", "deg", "120", "deg", "200", "deg/s"]
+    assert main(["clip", "convert", str(clip), str(out), "--scene", str(task)]) == 0
+    np.testing.assert_allclose(wb.read_clip(out, figure).q, q, atol=1e-9)
+    assert main(["clip", "play", str(clip), "--scene", str(task), "--out", str(tmp_path / "two.glb")]) == 0
+    nodes = glb(tmp_path / "two.glb")[0]["nodes"]
+    assert any("table" in node.get("name", "") for node in nodes)
 
 
 @pytest.mark.parametrize("ending", [".bvh", ".csv", ".txt", ".npz"])

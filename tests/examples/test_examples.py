@@ -33,7 +33,7 @@ OTHERS = (
     *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box", "push_a_cart"),
     *("reach_map", "study_of_people", "own_method", "two_arms_one_bar", "person_and_arm"),
     *("boundary_people", "branches_of_an_arm", "dominoes", "driver", "hold_a_pole", "plan_for_an_arm"),
-    "lift_retargeted",
+    *("lift_retargeted", "catch_a_ball"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -519,6 +519,21 @@ def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
     module = example("dominoes")
     module.COUNT = 3  # the example has more to look at
     assert module.main(out=tmp_path, pictures=False) == 3
+
+
+def test_the_ball_rests_in_the_arms_that_caught_it(example: Example, tmp_path: Path) -> None:
+    module = example("catch_a_ball")
+    assert module.main(out=tmp_path, pictures=False) < 1e-3  # m/s
+    world, way = module.build()
+    frames = [world.step(q) for q in way]
+    flown = [np.array(frame.placements["ball"].translation) for frame in frames]
+    assert np.linalg.norm(flown[-1] - module.FROM) > 1.5
+    # in the air it falls with g, and at last the person alone bears its weight, well above the floor
+    assert np.diff(flown[:20], 2, axis=0) * 60**2 == pytest.approx(np.tile((0.0, 0.0, -9.81), (18, 1)), abs=1e-6)
+    assert np.linalg.norm(np.diff(flown[-20:], axis=0), axis=1).max() < 1e-3 / 60.0
+    assert frames[-1].impulses["ball"] == pytest.approx((0.0, 0.0, module.MASS * 9.81 / 60.0), abs=1e-5)
+    assert flown[-1][2] > 1.0
+    assert max(frame.deepest for frame in frames) < 1e-4
 
 
 @pytest.mark.parametrize("name", ["driver", "hold_a_pole"])

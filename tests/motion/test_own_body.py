@@ -1,4 +1,4 @@
-"""Hands that rest on the own body, of people of another size: a man touches his head, a hip, a thigh."""
+"""Hands that rest on the own body, of people of another size: a man touches his head, a hip, a thigh; hands meet."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.motion.test_retargeting import person
+from tests.motion.test_things import robot, with_hands
 from wholebody.motion.skeleton import SkeletonMotion
 
 STARTS = {
@@ -88,3 +90,79 @@ def test_a_hand_that_rests_on_the_body_does_so(part: str, stature: float, tmp_pa
 def test_hands_of_a_walk_swing_past_the_thighs(shared_data: Path) -> None:
     motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_35_01.bvh")
     assert to_part(wb.retarget(motion, wb.load("human")), "right_thigh")[:, 0].min() > 0.02
+
+
+def hand_distance(clip: wb.Clip, ends: str) -> np.ndarray:
+    """(n,) distance of the pieces of one hand to those of the other, by coal."""
+    figure, found = clip.figure, []
+    data, placed = figure.model.createData(), figure.geometry.createData()
+    joints = [figure.model.frames[figure.frame_id(f"{side}_{ends}")].parentJoint for side in ("left", "right")]
+    for q in clip.q:
+        pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
+        left, right = (
+            [
+                (piece.geometry, coal.Transform3s(at.rotation, at.translation))
+                for piece, at in zip(figure.geometry.geometryObjects, placed.oMg, strict=True)
+                if joint in figure.model.supports[piece.parentJoint]
+            ]
+            for joint in joints
+        )
+        found.append(
+            min(
+                coal.distance(*one, *other, coal.DistanceRequest(), coal.DistanceResult())
+                for one in left
+                for other in right
+            )
+        )
+    return np.array(found)
+
+
+def meeting() -> SkeletonMotion:
+    """A person of 1.75 m whose hands are 5 cm apart before the chest."""
+    low, high = 0.0, 1.2
+    while high - low > 1e-6:  # how far the arms, which point forward, are turned inward
+        motion = person(12)
+        local = np.tile(np.eye(3), (12, len(motion.names), 1, 1))
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            local[:, motion.names.index(f"{side}_shoulder")] = pin.utils.rotate("z", -sign * 0.5 * (np.pi + low + high))
+        root = np.tile([0.0, 0.0, 0.94], (12, 1))
+        motion = SkeletonMotion.moved(motion.names, motion.parents, motion.offsets, local, root, 1 / 30, "meeting")
+        motion = with_hands(motion)
+        hands = [
+            motion.positions[:, [motion.names.index(f"{side}_{part}") for part in ("wrist", "hand")]].mean(axis=1)
+            for side in ("left", "right")
+        ]
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if (hands[0] - hands[1])[0, 1] > 0.05 else (low, middle)
+    return motion
+
+
+def test_wrists_without_pieces_meet_as_far_apart_as_hands_that_touch(tmp_path: Path) -> None:
+    """The recorded hands are 5 cm apart; wrists keep 6 cm, and the forearms, which have pieces, stay apart."""
+    figure = robot(tmp_path, 0.01)
+    clip = wb.retarget(meeting(), figure)
+    data, apart = figure.model.createData(), []
+    for q in clip.q:
+        pin.forwardKinematics(figure.model, data, q)
+        left, right = (
+            data.oMi[figure.model.getJointId(f"{side}_wrist_yaw_joint")].translation for side in ("left", "right")
+        )
+        apart.append(np.linalg.norm(left - right))
+    assert min(apart) > 0.058
+    assert max(apart) < 0.068
+    assert wb.check(clip).colliding == 0
+
+
+@pytest.mark.parametrize("stature", [1.5, None])
+def test_hands_that_meet_in_the_recording_meet(stature: float | None, tmp_path: Path) -> None:
+    """Hands of a person of 1.75 m are 5 cm apart, as palms that touch are; those of others touch, a robot's too."""
+    motion = meeting()
+    figure = robot(tmp_path) if stature is None else wb.load("human", stature=stature)
+    clip = wb.retarget(motion, figure)
+    apart = hand_distance(clip, "wrist_yaw" if stature is None else "hand")
+    assert apart.min() > 0.0
+    assert apart.max() < 1e-3
+    assert wb.check(clip).colliding == 0
+    assert np.ptp(clip.q[:, :3], axis=0).max() < 5e-3  # who stands still in the recording does so
+    alone = hand_distance(wb.retarget(motion, figure, ground=None), "wrist_yaw" if stature is None else "hand")
+    assert np.abs(alone).min() > 2e-3

@@ -178,3 +178,13 @@ def test_colors_are_checked_when_they_are_given(scene, wrong):
         scene.attach(wb.Sphere(0.1), to="head", name="ball", color=wrong)
     scene.add(wb.Sphere(0.1), name="ball", at=(1, 1, 1), color=(1, 0, 0))
     assert scene.objects["ball"].color == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_what_was_used_last_is_kept_of_what_follows_from_a_scene(scene):
+    built = scene.built
+    first = built.known(("of a test", "first"), object)
+    for number in range(200):
+        built.known(("of a test", number), object)
+        assert built.known(("of a test", "first"), object) is first
+    assert built.known(("of a test", 199), list) != []
+    assert built.known(("of a test", 0), list) == []  # forgotten, and made anew

@@ -10,10 +10,14 @@ from PIL import Image
 
 from wholebody.figures import load
 from wholebody.figures.surface import surface_of
-from wholebody.geometry.shapes import HalfSpace
+from wholebody.geometry.shapes import Box, HalfSpace
+from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.view import Viewer
+from wholebody.tasks import Point
+from wholebody.view import Viewer, screenshot
 from wholebody.view.browser import Browser
+from wholebody.view.page import picture_page
+from wholebody.view.screenshot import Screenshots
 
 pytestmark = pytest.mark.browser
 
@@ -63,3 +67,21 @@ def test_a_body_that_is_small_in_the_picture_is_drawn_with_fewer_triangles(brows
     coarse = sum(len(patch.coarse) for patch in surface.patches)
     assert near - small == fine - coarse
     assert small < 3 * coarse  # the shadow is drawn coarsely in both
+
+
+def test_a_page_for_pictures_has_the_shaders_of_a_person_among_things(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """They are compiled before the scene comes."""
+    monkeypatch.setattr(screenshot, "Browser", lambda **_: browser)
+    programs = "viewer.renderer.info.programs.map(program => program.cacheKey)"
+    browser.open_html(picture_page())
+    there = set(browser.evaluate(programs))
+    figure = load("human")
+    scene = Scene(figure).add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
+    scene.add(Box((0.4, 0.4, 0.4)), name="crate", at=(0.6, 0.0, 0.2))
+    problem = Problem(scene, goals=[Point("right_index_tip", (0.4, -0.2, 1.2))])
+    viewer = Viewer(scene, screenshots=Screenshots())
+    viewer.show(figure.posture("standing"), problem=problem)
+    viewer.picture(tmp_path / "person.png", (320, 240))
+    assert set(browser.evaluate(programs)) <= there

@@ -39,6 +39,7 @@ class AllPairs:
             of those that no question was about: they do not overlap, and are farther apart than the nearest pair and
             than what `nearer` and `ask` were asked.
         least: the least of them; inf without pairs.
+        none: no pairs.
     """
 
     def __init__(self, built: SceneGeometry) -> None:
@@ -50,6 +51,8 @@ class AllPairs:
         self._row = np.full(len(pairs), -1, dtype=np.intp)  # where a pair is among these; -1 where it was not asked
         self._near = np.empty(len(pairs), dtype=bool)
         self.distance, self.least = np.zeros(0), float("inf")
+        none = np.zeros(0, dtype=np.intp)
+        self.none = NearPairs(built, none, pairs[none], np.zeros((0, RESULT_FIELDS)), np.zeros((0, 2, 4, 3)))
 
     def move(self, q: Array) -> None:
         """Measure all pairs at the posture q (nq,); InputError for a q or a distance that is no finite number."""
@@ -59,7 +62,7 @@ class AllPairs:
             distances.place(self._built.model, self.state.data)
         distances.reset()
         if self._bounds is None:
-            self._found = _numbers(distances.all_measured())
+            self._found, self.least = _numbers(distances.all_measured())
             self.distance = self._found[:, 0].copy()
         else:
             if np.isnan(distances.placed).any():
@@ -70,7 +73,7 @@ class AllPairs:
             if not len(self._found):
                 self._ask(np.array([np.argmin(self.distance)]))
             self.ask(max(0.0, float(self._found[:, 0].min())))
-        self.least = float(self._found[:, 0].min(initial=np.inf))
+            self.least = float(self._found[:, 0].min(initial=np.inf))
 
     def shortfalls(self, q: Array, clearances: Array) -> tuple[Array, Array, Array]:
         """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq), for clearances (k, pairs).
@@ -94,8 +97,8 @@ class AllPairs:
             asked = number[row == k]
             distances.put(placed[k])
             distances.reset()
-            found = _numbers(distances.measured(asked))[:, 0]
-            depth[k], short[k] = max(0.0, -found.min()), max(0.0, (clearances[k, asked] - found).max())
+            found, least = _numbers(distances.measured(asked))
+            depth[k], short[k] = max(0.0, -least), max(0.0, (clearances[k, asked] - found[:, 0]).max())
         return joints, depth, short
 
     def _gaps(self, centres: Array) -> Array:
@@ -122,7 +125,7 @@ class AllPairs:
 
     def _ask(self, number: Indices) -> None:
         """Ask coal for pairs (k,)."""
-        found = _numbers(self._distances.measured(number))
+        found, _ = _numbers(self._distances.measured(number))
         self.distance[number], self._row[number] = found[:, 0], len(self._found) + np.arange(len(number))
         self._found = np.concatenate([self._found, found])
 
@@ -169,12 +172,12 @@ class _Balls:
         return self._apart
 
 
-def _numbers(found: Array) -> Array:
-    """Distances with what belongs to them (k, 10), where all are numbers."""
-    least = np.minimum.reduce(found[:, 0], initial=np.inf)  # NaN where one is, in half the time of isnan
+def _numbers(found: Array) -> tuple[Array, float]:
+    """Distances with what belongs to them (k, 10), where all are numbers, and the least."""
+    least = float(np.minimum.reduce(found[:, 0], initial=np.inf))  # NaN where one is, in half the time of isnan
     if least != least:
         raise InputError(NOT_A_NUMBER)
-    return found
+    return found, least
 
 
 def all_pairs(built: SceneGeometry) -> Pool[AllPairs]:

@@ -69,16 +69,19 @@ class _Asked(NamedTuple):
 
 
 class FirstOrder:
-    """Optimality and blockers of a judged posture, computed at the first request; `fits`: nothing blocks it."""
+    """Optimality and blockers of a judged posture, computed at the first request."""
 
-    def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
+    def __init__(self, problem: Problem, pairs: AllPairs, fits: bool, near: bool) -> None:
+        """Keep what they need; `fits`: nothing blocks the posture, `near`: a pair may be near its clearance."""
+        if fits:
+            self.blockers = ()
         self.fits = fits
         scene = problem.scene
         self._asked = _Asked(
             problem.goals, problem.constraints, problem.constraint_names, problem.bounds, problem.measures, scene.figure
         )
         self._built, self._q = scene.built, pairs.state.q.copy()
-        self._near = pairs.nearer(problem.clearances + ACTIVE)
+        self._near = pairs.nearer(problem.clearances + ACTIVE) if near else pairs.none
         self._clearances = problem.clearances[self._near.number]
 
     def __getstate__(self) -> dict[str, Any]:
@@ -98,8 +101,6 @@ class FirstOrder:
     @cached_property
     def blockers(self) -> tuple[Blocker, ...]:
         """See `Assessment`."""
-        if self.fits:
-            return ()
         with self._lent() as state:
             return _blockers(self._asked, state, self._near, self._clearances)
 

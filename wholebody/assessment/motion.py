@@ -74,7 +74,7 @@ def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] |
 def limit_violation(figure: Figure, q: Array) -> float:
     """Largest violation of a joint limit at any posture (n, nq) or (nq,), radians or metres."""
     limits = figure.limits
-    values = q[..., limits.idx_q]
+    values = q[..., limits.idx_q] if len(limits.idx_q) < q.shape[-1] else q  # all, in order
     return float(np.maximum.reduce(np.maximum(limits.lower - values, values - limits.upper), axis=None, initial=0.0))
 
 

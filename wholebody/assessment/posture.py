@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.assessment.all_pairs import AllPairs, all_pairs
-from wholebody.assessment.first_order import MET, Blocker, FirstOrder
+from wholebody.assessment.first_order import ACTIVE, MET, Blocker, FirstOrder
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import a, number, posture
@@ -136,8 +136,15 @@ def assess(problem: Problem, q: Array) -> Assessment:
         raise InputError(f"assess: problem is {a(type(problem))}, not a Problem; state one with wb.Problem(scene)")
     q = posture(q, problem.scene.model.nq)
     problem.scene.figure.warn_of_angles(q, "assess: q")
-    built = problem.scene.built
     problem.check_fresh()
+    return judged(problem, q, began)
+
+
+def judged(problem: Problem, q: Array, began: float | None = None) -> Assessment:
+    """What `assess` answers for a problem and a posture (nq,) that are checked, as at the end of a solve."""
+    began = time.perf_counter() if began is None else began
+    built = problem.scene.built
+    problem.check_scene()
     with all_pairs(built).borrow() as pairs:
         try:
             return _judged(problem, pairs, q, began)
@@ -150,9 +157,10 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     state = pairs.state
     distance, angle, each = goal_errors(problem, state)
     pairs.ask(problem.clearances)
-    violation = float(np.maximum.reduce(problem.clearances - pairs.distance, initial=0.0))
+    short = float(np.maximum.reduce(problem.clearances - pairs.distance, initial=-inf))
+    violation = max(0.0, short)
     missed = largest_violation(problem, state)
-    fits = all(left <= MET for left in (distance, angle, violation, missed))
+    fits = distance <= MET and angle <= MET and violation <= MET and missed <= MET
     return Assessment(
         goal_error=distance,
         goal_angle=angle,
@@ -161,24 +169,28 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         clearance_violation=violation,
         limit_violation=limit_violation(problem.scene.figure, q),
         constraint_violation=missed,
-        measure=sum((one(term, "value", term.weight * term.value(state)) for term in problem.measures), 0.0),
+        measure=sum([one(term, "value", term.weight * term.value(state)) for term in problem.measures], 0.0),
         goal_errors=each,
-        first_order=FirstOrder(problem, pairs, fits),
+        first_order=FirstOrder(problem, pairs, fits, short > -2.0 * ACTIVE),
         seconds=time.perf_counter() - began,
     )
 
 
 def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:
     """The largest distance [m] and the largest angle [rad] of goals from their targets, and the larger of each goal."""
-    found = [distance_and_angle(goal, state) for goal in problem.goals]
-    distances, angles = ([error[part] or 0.0 for error in found] for part in (0, 1))
+    distances, angles = list[float](), list[float]()
+    for goal in problem.goals:
+        distance, angle = distance_and_angle(goal, state)
+        distances.append(distance or 0.0)
+        angles.append(angle or 0.0)
     return max(distances, default=0.0), max(angles, default=0.0), tuple(map(max, distances, angles))
 
 
 def distance_and_angle(goal: Goal, state: State) -> tuple[float | None, float | None]:
     """Distance [m] and angle [rad] of a goal from its target; None for a goal without a position or a direction."""
-    error = _values(goal, goal.error, state)
-    angular = np.zeros(error.shape, dtype=bool) | goal.angular
+    error, angular = _values(goal, goal.error, state), goal.angular
+    if angular.shape != error.shape:
+        angular = np.zeros(error.shape, dtype=bool) | angular
     far, turned = error[~angular], error[angular]
     return sqrt(far.dot(far)) if len(far) else None, sqrt(turned.dot(turned)) if len(turned) else None
 

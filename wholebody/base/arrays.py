@@ -35,7 +35,9 @@ def as_dict(record: tuple[Any, ...]) -> dict[str, Any]:
 
 def with_values(record: Record, **values: Any) -> Record:
     """A copy of a record with other values of some fields, as `copy.replace` of Python 3.13 makes it."""
-    return type(record)(**{**as_dict(record), **values})
+    kind: Any = type(record)
+    made: Record = kind(**{**dict(zip(kind.__match_args__, record, strict=True)), **values})
+    return made
 
 
 def brief(self: Any) -> str:

@@ -22,7 +22,6 @@ from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, e
 from wholebody.version import __version__
 
 T = TypeVar("T")
-MOST_JOBS = 4096
 
 _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
 """A job as it is sent: its number, its function with the arguments, and its seconds."""
@@ -233,7 +232,7 @@ class Jobs(NamedTuple):
     def checked(cls, what: str, jobs: object = 1, cluster: object = None, progress: Any = None) -> Jobs:
         """Check the keyword arguments of a function `what`."""
         return cls(
-            checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
+            checks.whole(jobs, f"{what}: jobs", 1, 4096),
             None if cluster is None else checks.text(cluster, f"{what}: cluster"),
             reporter(progress, f"{what}: progress"),
         )

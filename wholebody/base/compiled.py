@@ -22,13 +22,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 TOGETHER = (
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.plain_chain"),
     (
         "wholebody.methods.qp.active_set",
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
     ("wholebody.dynamics.step_program",),
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.plain_chain"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",

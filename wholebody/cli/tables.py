@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 CONTACTS = 10
 """Most pairs that are listed."""
 
-UNWRAPPED = 140
-"""Letters of a line in a file or a log."""
-
 NEAR = 0.01
 """Metres beyond the clearance at which a pair is listed."""
 
@@ -41,7 +38,8 @@ _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "inf
 def console(least: int = 0) -> Console:
     """The output, whose lines have `least` letters or more, and where it is no terminal enough for all tables."""
     made = Console()
-    made.width = max(made.width, least, 0 if made.is_terminal else UNWRAPPED)
+    # letters of a line in a file or a log
+    made.width = max(made.width, least, 0 if made.is_terminal else 140)
     return made
 
 

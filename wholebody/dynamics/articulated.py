@@ -33,7 +33,6 @@ from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
-PARTED = 0.2  # share of an overlap that a step removes
 FASTEST = 0.5  # m/s, at most
 
 
@@ -89,7 +88,8 @@ class Articulated:
 
     def energy(self) -> float:
         """Kinetic and potential energy, joules."""
-        return self._kinetic() + float(pin.computePotentialEnergy(self._model, self._data, self.q))
+        kinetic = 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
+        return kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q))
 
     def momentum(self) -> Array:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,)."""
@@ -100,9 +100,6 @@ class Articulated:
     def _inertia(self, q: Array) -> Array:
         upper = np.triu(pin.crba(self._model, self._data, q))
         return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
-
-    def _kinetic(self) -> float:
-        return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much.
@@ -144,17 +141,18 @@ class Articulated:
             self.velocity = np.linalg.solve(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
-        unborne = self.velocity
+        unborne, sprung = self.velocity, self.stiffness > 0.0
         bearing = self._bear(driven, points, time)
-        impulse = blow + bearing
+        impulse, after = blow + bearing, self.velocity
         drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
-        after = self.velocity
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        first, last = (points.figure @ (0.5 * both) for both in (start + begin, unborne + after))
+        ways = start + begin, np.where(sprung, after, unborne) + after
+        first, last = (points.figure @ (0.5 * both) for both in ways)
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
-        # springs and contacts are implicit; what is free of them moves by the mean of both velocities
-        moves = time * np.where((self.stiffness > 0.0) | bearing.any(), after, mean)
-        paid = float(motor @ moves) + float(work[points.driven].sum())
+        # springs and contacts are implicit; what is free of them moves by the mean of both velocities, and limp
+        # freedoms are paid for the fall that contacts prevent
+        moves = time * np.where(sprung | bearing.any(), after, mean)
+        paid = float(motor @ moves + work[points.driven].sum() + (weight - borne) @ (moves - time * mean))
         motions = self._move(moves, segments, drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
@@ -271,14 +269,13 @@ class Articulated:
         target = np.where(hit, -points.restitution * approach, -np.inf)
         touching = points.gap <= 2.0 * SKIN
         target = np.where(touching & ~hit, 0.0, target)  # what is pressed together passes the blow on
-        if not hit.any():
-            return np.zeros((len(target), 3))
-        return self._solved(inertia, points, speed, target, True)
+        return self._solved(inertia, points, speed, target, True) if hit.any() else np.zeros((len(target), 3))
 
     def _bear(self, inertia: Array, points: Points, time: float) -> Array:
         """Keep points apart at the end of a step; the impulses (m, 3)."""
         room = points.gap - SKIN
-        target = np.where(room >= 0.0, -room / time, np.minimum(-PARTED * room / time, FASTEST))
+        # a step removes a fifth of an overlap
+        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, FASTEST))
         speed = self._relative(points)
         if points.bodies and self._engine is not None:
             fall = [self._engine.response(name)[:, :3] @ self._engine.weight(name) for name in points.bodies]
@@ -296,7 +293,7 @@ class Articulated:
                 part = points.things[:, 6 * b : 6 * b + 6]
                 mobility += part @ self._engine.response(name) @ part.T
         after = speed.copy()
-        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 100, 1e-7)
+        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 1000, 1e-7)
         flat = impulse.ravel()
         gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all

@@ -10,10 +10,19 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 
+FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
-@compiled()
+
+@compiled(error_model="numpy", fastmath=FAST, inline="always")
+def _push(row: int, one: float, two: float, three: float, mobility: Array, velocity: Array) -> None:
+    """Change all velocities by an impulse at the point of three rows; the matrix is symmetric, and read by rows."""
+    for k in range(len(velocity)):
+        velocity[k] += mobility[row, k] * one + mobility[row + 1, k] * two + mobility[row + 2, k] * three
+
+
+@compiled(error_model="numpy", fastmath=FAST)
 def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most: int, tolerance: float) -> Array:
-    """Impulses (m, 3) along the axes of m points, by Gauss and Seidel's method with projection.
+    """Impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both axes of friction together.
 
     At every point 0 <= p_n is complementary to u_n - target >= 0, and p_t is at most friction p_n against the sliding.
 
@@ -23,35 +32,53 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
         friction: (m,).
         target: (m,) least velocities along the normals, m/s.
         most: sweeps over all points.
-        tolerance: change of all velocities in a sweep at which it ends, m/s.
+        tolerance: change of all velocities at which it ends, in two sweeps, one each way, m/s.
     """
     count = len(friction)
-    impulse = np.zeros((count, 3))
-    for _ in range(most):
-        largest = 0.0
+    impulse, before, way = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
+    last, calm = np.inf, 0
+    for sweep in range(most):
+        largest, square = 0.0, 0.0
         for c in range(count):
-            for axis in range(3):
-                row = 3 * c + axis
-                own = mobility[row, row]
-                if own <= 1e-12:
-                    continue
-                wanted = target[c] if axis == 0 else 0.0
-                before = impulse[c, axis]
-                after = before + (wanted - velocity[row]) / own
-                if axis == 0:
-                    after = max(0.0, after)
-                else:
-                    other = impulse[c, 3 - axis]
-                    bound = np.sqrt(max(0.0, (friction[c] * impulse[c, 0]) ** 2 - other * other))
-                    after = min(max(after, -bound), bound)
-                change = after - before
-                if change != 0.0:
-                    impulse[c, axis] = after
-                    largest = max(largest, abs(change) * own)
-                    for k in range(3 * count):
-                        velocity[k] += mobility[k, row] * change
-        if largest < tolerance:
+            before[c, 0], before[c, 1], before[c, 2] = impulse[c, 0], impulse[c, 1], impulse[c, 2]
+        for number in range(count):
+            c = number if sweep % 2 == 0 else count - 1 - number
+            row = 3 * c
+            own, held = mobility[row, row], impulse[c, 0]
+            now = max(0.0, held + (target[c] - velocity[row]) / own)
+            if own <= 1e-12 or (now == 0.0 and held == 0.0):
+                continue
+            step, one, two, side = now - held, 0.0, 0.0, 0.0
+            if friction[c] > 0.0:  # one step along both axes, with a bound of the mobility along any
+                side = max(mobility[row + 1, row + 1], mobility[row + 2, row + 2]) + abs(mobility[row + 1, row + 2])
+                one = impulse[c, 1] - (velocity[row + 1] + mobility[row + 1, row] * step) / side
+                two = impulse[c, 2] - (velocity[row + 2] + mobility[row + 2, row] * step) / side
+                size, bound = np.sqrt(one * one + two * two), friction[c] * now
+                if size > bound:
+                    one, two = one * (bound / size), two * (bound / size)
+                one, two = one - impulse[c, 1], two - impulse[c, 2]
+            impulse[c, 0] = now
+            impulse[c, 1] += one
+            impulse[c, 2] += two
+            largest = max(largest, abs(step) * own, max(abs(one), abs(two)) * side)
+            square += step * step * own + (one * one + two * two) * side
+            _push(row, step, one, two, mobility, velocity)
+        calm = calm + 1 if largest < tolerance else 0
+        if calm == 2 or sweep == most - 1:
             break
+        share, last = square / last, square
+        for c in range(count):
+            if share >= 1.0:
+                way[c, 0], way[c, 1], way[c, 2] = 0.0, 0.0, 0.0
+                continue
+            step, one, two = share * way[c, 0], share * way[c, 1], share * way[c, 2]
+            for axis in range(3):
+                way[c, axis] = share * way[c, axis] + impulse[c, axis] - before[c, axis]
+            if step != 0.0 or one != 0.0 or two != 0.0:
+                impulse[c, 0] += step
+                impulse[c, 1] += one
+                impulse[c, 2] += two
+                _push(3 * c, step, one, two, mobility, velocity)
     return impulse
 
 

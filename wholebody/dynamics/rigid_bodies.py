@@ -247,7 +247,7 @@ class RigidBodies:
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
-        events, ended = program.resolve_impacts()
+        events, ended = program.resolve_impacts(np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0]))
         self._record(events, program, record)
         falling = self._falling & ~self._borne
         program.read_velocities(falling)

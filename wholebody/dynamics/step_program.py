@@ -128,20 +128,25 @@ class StepProgram:
         # what bears a body is known to the next points that join the step
         self.impulse = inserted(self.impulse, np.zeros((len(gap), 3)))
 
-    def resolve_impacts(self) -> tuple[Array, bool]:
-        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left."""
-        if not (self._touching & (self.speed < -SLOW)).any():
+    def resolve_impacts(self, ahead: Array) -> tuple[Array, bool]:
+        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.
+
+        `ahead` (n, 6) is what weight adds during the step to bodies that pushes gave its opposite: without it they
+        would seem to rise, and to meet what lies on them.
+        """
+        twist = self.state.bodies.twist + ahead
+        if not (self._touching & (self._rates(twist)[: len(self.speed), 0] < -SLOW)).any():
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
         weighed = state.bodies.given & np.isfinite(state.pieces.mass)
         rows = self._point_rows(state.bodies.moving | weighed) if weighed.any() else self._rows
-        twist, events = state.bodies.twist.copy(), np.zeros((1000, 5))
+        events = np.zeros((1000, 5))
         laws = Laws(self._friction, np.zeros(len(points.gap)), np.zeros((len(self.joints), 3)))
         count, ended = impact_kernel.resolve(
             np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
             events,
         )  # fmt: skip
-        state.bodies.twist[state.bodies.moving] = twist[state.bodies.moving]
+        state.bodies.twist[state.bodies.moving] = (twist - ahead)[state.bodies.moving]
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:

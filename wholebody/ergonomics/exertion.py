@@ -29,7 +29,6 @@ LEVER = 0.06
 (Chaffin, Andersson & Martin, "Occupational Biomechanics", chapter 6)."""
 
 ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
-NARROW = 0.01  # m: of soles nearer than this, seen from above, as if they were so far apart
 FEET = ("left_sole", "right_sole")
 RAISED = 0.03  # m: a sole higher than this over the lower one bears nothing
 MOST = 3400.0
@@ -100,7 +99,8 @@ class Statics(NamedTuple):
             return [(self.feet[0].joint, at, d_at, whole, np.zeros_like(d_at))]
         (left, right), (d_left, d_right), level = soles, moves, np.array((1.0, 1.0, 0.0))
         line, d_line = level * (left - right), level[:, None] * (d_left - d_right)
-        length = max(float(line @ line), NARROW**2)
+        # m: soles nearer to each other, seen from above, count as so far apart
+        length = max(float(line @ line), 0.01**2)
         share = float(line @ (at - right)) / length
         d_share = ((at - right) @ d_line + line @ (d_at - d_right) - 2.0 * share * (line @ d_line)) / length
         if not 0.0 < share < 1.0:

@@ -21,7 +21,6 @@ from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
 NEUTRAL = radians(5.0)  # Up to which a wrist is neutral, a trunk upright, and a head not in extension
-ABDUCTED = radians(20.0)
 RAISED = 0.03  # m: of a shoulder
 DEVIATED = radians(10.0)  # of a wrist from its middle line
 END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side: "at or near the end of range"
@@ -125,7 +124,7 @@ def raised(arm: SideAngles) -> int:
     """Score of an upper arm that nothing supports, 1 to 6: its flexion, a raised shoulder, abduction; also of REBA."""
     bent = arm.shoulder_flexion
     score = 4 if bent > radians(90.0) else 3 if bent > radians(45.0) else 2 if abs(bent) > radians(20.0) else 1
-    return score + int(arm.shoulder_rise > RAISED) + int(arm.shoulder_abduction > ABDUCTED)
+    return score + int(arm.shoulder_rise > RAISED) + int(arm.shoulder_abduction > radians(20.0))
 
 
 def lower_arm(arm: SideAngles) -> int:

@@ -325,10 +325,10 @@ class Figure(checks.FixedAttributes):
 
     def clamp(self, q: Array) -> Array:
         """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value."""
-        q = self._checked(q).copy()
-        idx_q, _, lower, upper = self.limits
-        q[idx_q] = np.minimum(np.maximum(q[idx_q], lower), upper)
-        return q
+        q, (idx_q, _, lower, upper) = self._checked(q), self.limits
+        within, some = q.copy(), idx_q if len(idx_q) < len(q) else slice(None)  # all are in order
+        within[some] = np.minimum(np.maximum(q[some], lower), upper)
+        return np.asarray(within)
 
     def grounded(self, q: Array, scene: Any) -> Array:
         """Return a copy of q (nq,) moved vertically until the lowest segments stand on the things of a scene.

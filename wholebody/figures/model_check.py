@@ -75,7 +75,8 @@ class Turning:
     def warn(self, q: Array, what: str) -> bool:
         """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
         q = np.asarray(q)
-        if q.ndim == 1 and np.logical_and.reduce((q >= self._least) & (q <= self._most)):  # at every step of a tracker
+        # at every step of a tracker: bytes are looked through in a tenth of the time of a reduction
+        if q.ndim == 1 and 0 not in ((q >= self._least) & (q <= self._most)).tobytes():
             return False
         rows = np.atleast_2d(q)
         if not len(rows) or not len(self._places):

@@ -212,16 +212,16 @@ class _Parting:
         """Move every joint back towards zero while the posture stays free, ignoring the pairs that are left out."""
         way = np.asarray(pin.difference(self.model, self.zero, q))
         for place in np.argsort(-np.abs(way), kind="stable").tolist():
+            if not abs(way[place]) > 1e-9:
+                break  # nor do the others move, which are moved less
             for share in (1.0, 0.5, 0.25):
                 trial = way.copy()
                 trial[place] *= 1.0 - share
-                if abs(way[place]) > 1e-9 and self._free(np.asarray(pin.integrate(self.model, self.zero, trial)), left):
+                q = np.asarray(pin.integrate(self.model, self.zero, trial))
+                if left.issuperset(self.contacts(q, 0.5 * APART).number.tolist()):
                     way = trial
                     break
         return np.asarray(pin.integrate(self.model, self.zero, way))
-
-    def _free(self, q: Array, left: frozenset[int]) -> bool:
-        return left.issuperset(self.contacts(q, 0.5 * APART).number.tolist())
 
     def _corrected(self, q: Array, near: Contacts) -> Array:
         joint = self.proximity.table.joint

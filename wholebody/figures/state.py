@@ -10,12 +10,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, cross
-from wholebody.base.checks import instance, posture, whole
+from wholebody.base.checks import DOUBLE, instance, posture, whole
 from wholebody.base.errors import InputError
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.geometry.memory_views import placement_view
 
-DOUBLE = np.dtype(np.float64)
 UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
 
 
@@ -64,7 +63,7 @@ class State:
         self._columns = extended_columns(model)
         if self._columns is not None:
             self._fold = np.eye(model.nv)[self._columns]
-        self._nq = model.nq
+        self._nq, self._plain = model.nq, model.nq == model.nv  # whether no joint has a unit vector
         self._take_jacobian()
         self._shared = np.shares_memory(self.jacobian, self.data.J)
         self._joints = placement_view(self.data.oMi)
@@ -87,7 +86,7 @@ class State:
         usual = type(q) is np.ndarray and q.dtype is DOUBLE and q.shape == (self._nq,)
         if not usual or not isfinite(q.dot(q)):
             q = posture(q, self._nq)
-        if not pin.isNormalized(self.model, q, UNIT_TOLERANCE):
+        if not self._plain and not pin.isNormalized(self.model, q, UNIT_TOLERANCE):
             raise InputError(
                 "the posture's quaternion is not of unit length; normalise it with pin.normalize(model, q)"
             )
@@ -139,7 +138,8 @@ class State:
             index = whole(index, "the index of a frame", 0, self.model.nframes - 1)
         placement = self._frames.get(index)
         if placement is None:
-            index = whole(index, "the index of a frame", 0, self.model.nframes - 1)
+            if not 0 <= index < self.model.nframes:
+                whole(index, "the index of a frame", 0, self.model.nframes - 1)
             placement = self._frames[index] = pin.updateFramePlacement(self.model, self.data, index)
         return placement
 

@@ -172,6 +172,7 @@ class Proximity:
         self._travelled, self._endless = np.zeros(count), np.full(pairs, np.inf)
         self._bound = np.array([self._endless, table.points_meet])
         self._placed, self._buffer = np.zeros((count, 4, 3)), ContactBuffer(64)
+        self._none = self._buffer.contacts(0, self._placed)
         self._looked = (
             table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
             np.zeros((count, 3)), marks,
@@ -211,6 +212,8 @@ class Proximity:
         """What `query` returns, in arrays that the next call of this overwrites."""
         index, placed = self.ask(data, within)
         self._placed[:] = placed
+        if not len(index):
+            return self._none
         if len(index) > self._buffer.size:
             self._buffer = ContactBuffer(2 * len(index))
         return self._gathered(self._buffer, self._placed, index, within, None)

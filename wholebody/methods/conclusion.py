@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.assessment.posture import Assessment, assess
-from wholebody.base.arrays import Array
+from wholebody.assessment.posture import Assessment, judged
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import Control
@@ -17,8 +18,7 @@ from wholebody.solution import Solution, Status, TraceEntry
 from wholebody.tasks.balance import Balance
 
 
-@dataclass(frozen=True)
-class Ending:
+class Ending(NamedTuple):
     """The end of a search."""
 
     q: Array  # (nq,) the posture
@@ -34,7 +34,7 @@ class Ending:
     contradictions: tuple[Contradiction, ...] | None = None
     judgement: Assessment | None = None  # the assessment of the posture, if the search has made it already
     # number of quadratic programs that each solver closed; empty for a method without programs
-    programs: Mapping[str, int] = field(default_factory=dict)
+    programs: Mapping[str, int] = MappingProxyType({})
     method: str = ""  # what was run, where that says more than the method's name
     unreached: str = "not reachable from here"  # what the search knows of goals that are missed
 
@@ -54,11 +54,11 @@ def meets(judgement: Assessment, tolerance: float) -> bool:
 
 def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control) -> Solution:
     """The solution of a problem, whose search began with its control."""
-    judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
+    judgement = judged(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
     if control.undefined is not None:
         control.undefined = problem.placed(control.undefined)
-        ending = replace(ending, settled=False, unit="postures where all terms are finite")
+        ending = with_values(ending, settled=False, unit="postures where all terms are finite")
     status = _status(judgement, ending, enough, bool(control.reason))
     if ending.contradictions is None:
         why = "" if status == "solved" else explanation(problem)
@@ -80,7 +80,7 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
         trace=ending.trace,
         method=ending.method or method,
         message=said + "".join(after),
-        programs=ending.programs,
+        programs=dict(ending.programs),
     )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -26,10 +27,7 @@ NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole betwee
 TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
-FACING = 0.3  # least cosine of the angle from up to the normal of a sole that faces the ground
-FOLLOW = 0.8  # share of the body's shift that a new place keeps; the rest goes back with time
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
-LOST = 0.02  # m: points farther than this from their place on a thing cannot reach it
 OVER = 0.2  # s: in which a point goes over to where it rests
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
 
@@ -46,20 +44,39 @@ class Touched:
         return pin.SE3.Identity() if contact.base else self.things.at(contact.thing, frame)
 
     def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
-        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it."""
+        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it.
+
+        A part without pieces has none: its point is as far away as the skeleton's place is.
+        """
         pin.forwardKinematics(self._figure.model, self._data, q)
         normal = self._data.oMi[contact.base].rotation @ self.at(contact, contact.first).rotation @ contact.normal
         pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
-        away = CLEARANCE + thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
-        return contact.place + away * contact.normal
+        away = thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
+        if not self._carried(point.joint):
+            away = contact.away
+        return contact.place + (CLEARANCE + away) * contact.normal
 
     def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
         """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
         pin.forwardKinematics(self._figure.model, self._data, q)
-        own = self._carried(point.joint)
+        own = self._part(point.joint, point.place, contact.away)
         if not contact.base:
             return least_distance(own, self.things.pieces(contact.thing, frame))
-        return least_distance(own, self._carried(contact.base, most=int(contact.thing.endswith("hand"))))
+        center = contact.place - contact.away * contact.normal
+        other = self._part(contact.base, center, contact.away, most=int(contact.thing.endswith("hand")))
+        return least_distance(own, other)
+
+    def _part(self, joint: int, center: Array, radius: float, most: int = 100) -> list[Placed]:
+        """What a joint carries, see `_carried`; where that is nothing, a ball about a place (3,), and the limb before.
+
+        The limb may reach beyond the place: then it is what touches.
+        """
+        if carried := self._carried(joint, most):
+            return carried
+        ball = coal.Sphere(max(radius, 1e-6)), self._data.oMi[joint] * pin.SE3(np.eye(3), center)
+        bearing = {piece.parentJoint for piece in self._figure.geometry.geometryObjects}
+        limb = max(bearing & set(self._figure.model.supports[joint]), default=joint)
+        return [ball, *self._carried(limb, 0)]
 
     def _carried(self, joint: int, most: int = 100) -> list[Placed]:
         """Pieces on a joint and beyond it, over `most` joints with pieces at most."""
@@ -119,7 +136,8 @@ class Holds:
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
             normal, gap, off = self._met(number, stand, frame, q, places, held[0])
-            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > LOST:
+            # m: points farther than this from their place on a thing cannot reach it
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > 0.02:
                 held[1][number] = 0.0
                 self._gone.add((number, frame))
         return any(each[1] == frame for each in self._gone)
@@ -273,7 +291,8 @@ class Holds:
             back, left, right, front = places[own[:4]]
             (x, y, z), (u, v, w) = (front - back).tolist(), (left - right).tolist()
             up = x * v - y * u  # of the normal, the cross product of both
-            found[own] = up > FACING * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
+            # least cosine of the angle from up to the normal of a sole that faces the ground
+            found[own] = up > 0.3 * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
         return found
 
     def landed(self, frame: int, places: Array, held: tuple[Array, Array], span: int) -> None:
@@ -304,7 +323,8 @@ class Holds:
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))
-        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + FOLLOW * shift
+        # a new place keeps this share of the body's shift; the rest goes back with time
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.8 * shift
         point = self.points[number]
         if point.edge:
             place[2] = self._height(place, stand)

@@ -221,7 +221,6 @@ def _deepest_pair(found: ClipCheck, place: int, *, between: bool) -> str:
 
 
 JUMP = 0.35  # rad, m: least change of a coordinate from frame to frame that can be a jump
-SUDDEN = 4.0  # a jump is so many times as long as the steps before and after it
 
 
 def foreseen(terms: FrameTerms, was: ClipCheck, keep_ends: bool) -> str:
@@ -263,7 +262,8 @@ def _jumps(was: ClipCheck) -> str:
     steps = np.abs([pin.difference(model, *pair) for pair in pairwise(q)]).reshape(-1, model.nv)
     around = np.zeros_like(steps)
     around[1:], around[:-1] = steps[:-1], np.maximum(around[:-1], steps[1:])
-    jumps = (steps > np.maximum(JUMP, SUDDEN * around)) & (was.between > was.tolerance)[:, None]
+    # a jump is so many times as long as the steps before and after it
+    jumps = (steps > np.maximum(JUMP, 4.0 * around)) & (was.between > was.tolerance)[:, None]
     if not jumps.any():
         return ""
     gap, column = np.unravel_index(int(np.where(jumps, steps, 0.0).argmax()), steps.shape)

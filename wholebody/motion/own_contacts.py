@@ -30,10 +30,9 @@ BODY = {
 }
 """Of parts that hands touch both ends of a bone, and how far a hand that touches them is from it, metres."""
 
-HAND = 0.06  # m: as far from each other are hands that touch
+HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
 SLACK = 0.02  # m: farther away than that by more than this nothing is touched: hands that swing past hips do not
 ARM = ("shoulder", "elbow", "wrist", "hand")
-OUTSIDE = 0.1  # m: so far outside of a part the nearest place on it is on the side that the hand came from
 
 
 def hand_shares(joints: Mapping[str, str]) -> dict[str, float]:
@@ -108,11 +107,18 @@ def own_contacts(
     body, found = [joint for joint in pieces if not arms & set(model.supports[joint])], []
     for rest in rests:
         hand, other = hands[rest.role], hands.get(rest.thing)
+        if other is None and not body:
+            continue  # a body without pieces has nothing to touch
         pin.forwardKinematics(model, data, free[(rest.first + rest.end) // 2])
         here = data.oMi[hand.joint].act(hand.place)
         near = {joint: nearest(pieces[joint], data.oMi[joint].actInv(here))[0] for joint in body}
         base = min(near, key=lambda joint: near[joint]) if other is None else other.joint
         start = here if other is None else data.oMi[base].act(other.place)
-        _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + OUTSIDE * rest.normal))
-        found.append(with_values(rest, place=place, normal=normal, base=base))
+        if base in pieces:
+            # m: so far outside of a part, the nearest place on it is on the side that the hand came from
+            _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + 0.1 * rest.normal))
+        else:
+            place = data.oMi[base].actInv(start + 0.5 * HAND * rest.normal)
+            normal = data.oMi[base].rotation.T @ rest.normal
+        found.append(with_values(rest, place=place, normal=normal, base=base, away=0.5 * HAND))
     return found

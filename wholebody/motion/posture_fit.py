@@ -36,7 +36,6 @@ PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
 LEAST_LEVER = 0.1  # m
 WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
-ANCHOR = 0.3  # weight of the place of the hips; 1 is that of a bone
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
 TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
 RELAXED = 1e-10  # of the price: less holds contacts more exactly, and costs the program digits
@@ -70,8 +69,7 @@ class Layout(NamedTuple):
     bones: Array  # (b, p) combinations of points: a row has 1 and -1 for a bone, or positive shares for the anchor
     bone_weights: Array  # (b,) weight of each
     turn_weights: Array  # (t,) weight of each angle, metres per radian
-    # of each point that may be held its joint, its place (3,) in it, and the joint of its base, 0 for the world
-    held: list[tuple[int, Array, int]]
+    held: list[HeldPoint]  # points that may be held
 
 
 class Fitter:
@@ -80,10 +78,15 @@ class Fitter:
     def __init__(self, figure: Figure, layout: Layout, workspace: Workspace) -> None:
         self.figure, self.model, self.layout, self._workspace = figure, figure.model, layout, workspace
         self._state = workspace.state
-        points = [*layout.points, *layout.held]
-        self._place_joints = np.array([joint for joint, *_ in points], dtype=np.intp)
-        self._local = np.array([place for _, place, *_ in points]).reshape(-1, 3)
-        self._bases = np.array([base for _, _, base in layout.held], dtype=np.intp)
+        points = [*layout.points, *((point.joint, point.place) for point in layout.held)]
+        self._place_joints = np.array([joint for joint, _ in points], dtype=np.intp)
+        self._local = np.array([place for _, place in points]).reshape(-1, 3)
+        self._bases = np.array([point.base for point in layout.held], dtype=np.intp)
+        bearing = {
+            joint for piece in figure.geometry.geometryObjects for joint in self.model.supports[piece.parentJoint]
+        }
+        bare = [bool(point.thing) and point.joint not in bearing for point in layout.held]
+        self._bare = np.repeat(np.array(bare, dtype=bool), 3)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
         moved = self._state.support[[*self._place_joints, *self._turn_joints]]
         moved[len(layout.points) : len(self._local)] -= self._state.support[self._bases]
@@ -111,6 +114,8 @@ class Fitter:
         self._cone_rows, self._angles = np.zeros((len(cones), 6)), np.zeros(len(cones))
         self._free = 6 if figure.root == "free" else 0
         self._diagonal = np.diag_indices(figure.model.nv)
+        self._turning = np.ones(figure.model.nv)  # 0 for what moves along lines
+        self._turning[: self._free // 2] = 0.0
 
     def _carried(self, frames: list[str]) -> tuple[Indices, Array]:
         """The joint that carries each frame, and in it the frame's rotation (3, 3) over its place: (k, 4, 3)."""
@@ -163,7 +168,7 @@ class Fitter:
         square = goals.posture_weights**2
         gradient = rows.T @ errors + square * posture
         hessian = rows.T @ rows
-        hessian[self._diagonal] += square + damping
+        hessian[self._diagonal] += square + damping + self._curvature(errors, goals)
         lower, upper = self.figure.tangent_bounds(q)
         lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
         lower[: self._free], upper[: self._free] = -10.0, 10.0  # m, rad
@@ -239,6 +244,15 @@ class Fitter:
         angles = self._turn_weights * np.array([pin.log3(turn) for turn in turned]).reshape(-1)
         return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])
 
+    def _curvature(self, errors: Array, goals: Goals) -> Array:
+        """(nv,) bounds of what the rows leave out: a turn's second derivative times what a point without pieces misses.
+
+        Without it a step turns wrists far for millimetres, as their levers are short, and the next one turns them back.
+        """
+        first, weights = len(self._bones), goals.held_weights.ravel()[self._bare]
+        pull = np.abs(errors[first : first + goals.held.size][self._bare] * weights).max(initial=0.0)
+        return np.asarray(LEAST_LEVER * pull * self._turning)
+
     def _rows(self, places: Array, goals: Goals) -> Array:
         """Derivatives (m, nv) of the weighted errors."""
         (x, y, z), count = places.T, 3 * len(places)
@@ -297,12 +311,13 @@ def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure,
     weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
     if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
         rows.append(place["hips"])
-        weights.append(ANCHOR)
+        # of the place of the hips; 1 is that of a bone
+        weights.append(0.3)
     else:  # what is known says where it is
         rows += [place[role] for role in points]
         weights += [1.0] * len(points)
     return Layout(
         [own[role] for role in points], [roles.turns[role] for role in turns], np.array(rows),
         np.array(weights), np.array([TURNS[role.split("_")[-1]] for role in turns]),
-        [(point.joint, point.place, point.base) for point in held],
+        held,
     )  # fmt: skip

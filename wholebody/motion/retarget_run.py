@@ -41,7 +41,6 @@ FIRST, FREE, FORWARD, SWEEP = 60, 2, 3, 1
 EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
 JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
-FIRST_STEP = 0.1  # rad, m: largest change in a step of a first frame whose parts touch things; longer ones miss these
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
@@ -53,7 +52,6 @@ GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a 
 EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 # s², weight of overlaps between frames over the square of the time step: less than of what rests, which they would move
-PASS = 0.8
 LATE = 1.3  # omega of sweeps that look at motions between frames: earlier ones are far from where these will be
 MENDED = 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
 KEPT = 30  # frames before the last one that stay known, for what looks back
@@ -382,7 +380,7 @@ class Run:
 
     def _midway(self, k: int) -> list[Midway]:
         """Where motions to the frames beside one overlap; it gives way by half to the next one, which does the rest."""
-        weight = PASS / self.dt**2
+        weight = 0.8 / self.dt**2
         found = [Midway(self._found[k - 1], 1.0 - share, 1.0, weight) for share in self._dips.get(k, ())]
         return found + [Midway(self._found[k + 1], share, 0.5, weight) for share in self._dips.get(k + 1, ())]
 
@@ -390,7 +388,8 @@ class Run:
         """Least and greatest displacement (2, nv) of q that joints reach from the postures before and after in time."""
         if before is None:
             touches = self.holds is not None and self.holds.touches
-            return np.asarray(FIRST_STEP * np.outer((-1.0, 1.0), np.ones(self.model.nv))) if touches else None
+            # rad, m: largest change in a step of a first frame whose parts touch things; longer ones miss these
+            return np.asarray(0.1 * np.outer((-1.0, 1.0), np.ones(self.model.nv))) if touches else None
         room = np.asarray(span * self.reach - pin.difference(self.model, before, q))
         if after is not None:
             other = self.reach - pin.difference(self.model, after, q)

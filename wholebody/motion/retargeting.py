@@ -198,7 +198,13 @@ def _touching(joints: Mapping[str, str], roles: Roles) -> dict[str, str]:
 
 
 def same_figure(scene: Scene, figure: Figure) -> None:
-    """Refuse a scene of another figure."""
+    """Refuse a scene of another figure, or of several."""
+    if scene.figure.root == "several":
+        name = next(iter(scene.figure.bodies)).rstrip("/")
+        raise InputError(
+            "retarget: the scene has several figures; leave it out, move the clip's free root to where the figure "
+            f"stands, join the postures by figure.posture({{{name!r}: q, ...}}), and free the clip of all by avoid"
+        )
     if scene.figure.joints != figure.joints or scene.model.nq != figure.model.nq:
         raise InputError(f"retarget: the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
 

@@ -7,7 +7,6 @@ volume is sampled on a grid, the centres are those of n clusters of the solid's 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import coal
@@ -118,7 +117,8 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
     fits = (_fitted(grid, count, seed) for seed in range(3))  # seeded clusterings, of which the best is kept
     centers, radii, uncovered, outside = min(fits, key=lambda fit: UNCOVERED * fit[2] + fit[3])
     corners = np.vstack([grid.inside, vertices])
-    beyond = max(_gap(part, centers, radii).max() for part in _parts(corners))
+    parts = np.array_split(corners, max(1, len(corners) // 4000))  # all at once would take memory
+    beyond = max(_gap(part, centers, radii).max() for part in parts)
     depth = _signed_depth(centers, vertices, faces)
     return SphereFilling(
         Spheres(centers, radii),
@@ -242,10 +242,6 @@ def _gap(points: Array, centers: Array, radii: Array) -> Array:
     """(k,) distance of points from the nearest sphere; negative inside."""
     gap: Array = (np.linalg.norm(points[:, None] - centers, axis=2) - radii).min(axis=1)
     return gap
-
-
-def _parts(points: Array) -> Iterator[Array]:
-    return iter(np.array_split(points, max(1, len(points) // 4000)))
 
 
 def _signed_depth(points: Array, vertices: Array, faces: Faces) -> Array:

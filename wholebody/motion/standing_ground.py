@@ -23,7 +23,6 @@ FEET = ("ankle", "toe")
 OTHERS = ("hand", "wrist", "knee")
 APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
 HEIGHT, MOST_FRAMES = Range(-1e6, 1e6, "m"), 10**9
-NEAR_GROUND = 0.12  # m: highest place of a knee's or wrist's joint above the ground on which it rests
 
 
 class Foothold(NamedTuple):
@@ -263,7 +262,8 @@ def _others(
     middles, floors = np.array([each.place[:2] for each in feet]), np.array([each.height for each in feet])
     nearest = np.linalg.norm(at[:, None, :2] - middles[None], axis=2).argmin(axis=1)
     floor = floors[nearest] + min(above.values())
-    low = (speeds(at, motion.dt, SPAN) <= limits.speed) & (at[:, 2] <= floor + NEAR_GROUND)
+    # m: highest place of a knee's or wrist's joint above the ground on which it rests
+    low = (speeds(at, motion.dt, SPAN) <= limits.speed) & (at[:, 2] <= floor + 0.12)
     mask = long_runs(low, max(1, round(limits.least / motion.dt)))
     return mask, [
         Foothold(role, *run, at[run.first : run.end].mean(axis=0), float(floors[nearest[run.first]]))

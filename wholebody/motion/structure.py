@@ -21,7 +21,6 @@ from wholebody.geometry.pieces import box_corners
 from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
 
 PARTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "head")
-NEAR_JOINTS = 0.07  # of a figure's size: joints that are nearer to each other meet in one place
 UPRIGHT = 0.5  # of a trunk's length: its shoulders stand as high above its hips at least
 SHORT = 0.01  # of the skeleton's longest way: a bone that is shorter has no direction
 
@@ -184,7 +183,8 @@ def built_figure(figure: Figure) -> dict[str, str]:
     pin.computeJointJacobians(model, data, upright(figure))
     real = np.array([place.translation for place in data.oMi])
     at, root = real.copy(), 1 if figure.root == "free" else 0
-    near = NEAR_JOINTS * float(np.ptp(at[root:], axis=0).max())
+    # joints that are nearer to each other than this share of the figure's size meet in one place
+    near = 0.07 * float(np.ptp(at[root:], axis=0).max())
     first, groups, parents = {root: 0}, [[root]], [-1]  # joint to its group
     axes = np.asarray(data.J).reshape(6, -1)[3:]  # Pinocchio's is (6,) where there is one column
     for joint in range(root + 1, model.njoints):

@@ -29,7 +29,6 @@ SHARES = (1.0, 0.5, 0.0)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
 
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
-THICKEST = 0.25  # m: of a part from its joint to its skin
 
 
 class ThingContact(NamedTuple):
@@ -44,6 +43,7 @@ class ThingContact(NamedTuple):
     normal: Array  # (3,) of unit length, out of the thing, in its axes
     share: float = 1.0  # of a hand: where between its wrist and its joint it touches
     base: int = 0  # joint of the figure whose axes these are, where the thing is a part of its body; else 0
+    away: float = 0.0  # metres from the surface to the skeleton's place, at which a part without pieces is held
 
 
 def still_things(scene: Scene) -> list[str]:
@@ -142,8 +142,8 @@ class Things:
                 for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
                     middles = [each[run.first : run.end].mean(axis=0) for each in local]
                     ends = [nearest(pieces, middle) for middle in middles]
-                    share, (_, place, normal) = min(zip(shares, ends, strict=True), key=lambda one: abs(one[1][0]))
-                    found.append(ThingContact(role, *run, name, place, normal, share))
+                    share, (gap, place, normal) = min(zip(shares, ends, strict=True), key=lambda one: abs(one[1][0]))
+                    found.append(ThingContact(role, *run, name, place, normal, share, away=max(gap, 0.0)))
                     free[run.first : run.end] = False
         return sorted(found, key=lambda one: one.first)
 
@@ -177,7 +177,8 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
     last = 0.0
     for piece in pieces:
         where, far = coal.Transform3s(piece.placement.rotation, piece.placement.translation), 0.0
-        while far < THICKEST:  # advances by the distance to the surface, inside and outside, so it misses no thick part
+        # m: from the joint of the thickest part to its skin
+        while far < 0.25:  # advances by the distance to the surface, inside and outside, so it misses no thick part
             center = coal.Transform3s(np.eye(3), start + far * along)
             # a result that is used again keeps the least distance of all
             gap = float(coal.distance(ball, center, piece.geometry, where, request, coal.DistanceResult()))

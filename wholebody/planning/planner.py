@@ -39,7 +39,6 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
-NEARER = 0.95  # of the length of the best motion: what others are shorter than
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
 AGAIN = 0.35  # of the time limit: for shorter paths; more = shorter, later
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
@@ -248,7 +247,8 @@ class _Search:
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
         enough = self._local.samples
         while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < AGAIN):
-            path, trees = self._path(NEARER * most, np.inf if not runs else enough - samples)
+            # other motions are shorter than this share of the best one
+            path, trees = self._path(0.95 * most, np.inf if not runs else enough - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break

@@ -8,8 +8,6 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
-SLID = 2.0  # rad, m: of a branch along things; more = longer branches, for 2 ms a step
-
 
 class Tree:
     """Postures that free motions join to its roots."""
@@ -97,7 +95,8 @@ class RRTConnect:
         number = tree.nearest(target)
         way, met = self._local.towards(tree.postures[number], target)
         if not (way or met) and slides is not None:
-            way, met = slides.towards(tree.postures[number], target, SLID)
+            # rad, m: length of a branch along things; longer ones take 2 ms a step
+            way, met = slides.towards(tree.postures[number], target, 2.0)
         for q in way:
             number = tree.add(q, number)
         return (number if way or met else None), met

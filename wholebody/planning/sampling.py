@@ -12,7 +12,6 @@ from wholebody.methods.simplification.reach import still_dofs
 from wholebody.problem import Problem
 
 ROOM = 1.0  # m: by which samples move a free root along each axis
-BATCH = 256  # postures that are drawn at once, which takes a hundredth of drawing each
 
 
 def holds(problem: Problem) -> bool:
@@ -54,7 +53,8 @@ class Sampler:
     def anywhere(self) -> Array:
         """A random posture (nq,) within limits, whatever is held."""
         if not self._drawn:
-            self._drawn = list(random_postures(self._figure.model, BATCH, int(self._rng.integers(2**31))))
+            # postures that are drawn at once, which takes a hundredth of drawing each
+            self._drawn = list(random_postures(self._figure.model, 256, int(self._rng.integers(2**31))))
         return self._drawn.pop()
 
     def near(self, q: Array, spread: float) -> Array:

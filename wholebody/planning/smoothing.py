@@ -15,8 +15,6 @@ from wholebody.planning.local_planner import LocalPlanner
 
 WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
-CORNER = 2.0  # points: width of the filter of what is left of corners; larger = rounder, less exact
-MIXTURES = 8  # of the filtered path and the free one; more = smoother beside things, and later
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
 
 
@@ -105,7 +103,8 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
     free = places(model, path)
     wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path.copy()
     blocked, anew = np.zeros(len(path) - 1, dtype=bool), np.ones(len(path), dtype=bool)
-    for _ in range(MIXTURES):
+    # mixtures of the filtered path and the free one; more = smoother beside things, and later
+    for _ in range(8):
         share[[0, -1]] = 0.0
         mixed = _postures(model, path, free + share[:, None] * (wide - free))
         for part in _runs(anew):
@@ -116,7 +115,8 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         anew = near > 0.01 * near.max()
         share -= 0.6 * share * np.where(anew, near / near.max(), 0.0)
-    rounded, cut = local.settled(_postures(model, path, _filtered(places(model, found), CORNER)))
+    # width of the filter of what is left of corners, points; larger = rounder, less exact
+    rounded, cut = local.settled(_postures(model, path, _filtered(places(model, found), 2.0)))
     if BUDGET.over:
         return path
     return found if (cut & ~blocked).any() else rounded

@@ -21,9 +21,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
 from wholebody.planning.smoothing import places
 
-SLOWINGS = 10  # of a motion whose frames exceed a limit, which the derivatives keep
 UNLIMITED = 1e9  # rad/s, m/s: no limit; that of a free root is the largest number
-USUAL_SPEED = 2.0  # rad/s, m/s: of joints without a limit of their own
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,8 @@ class Pace(Checked):
         """(nv,) largest velocities; a limit of the figure of 0 counts as none."""
         checks.instance(figure, Figure, "fastest: figure", "load one with wb.load('human')")
         own = np.array(figure.model.velocityLimit, dtype=float).reshape(-1)
-        usual = USUAL_SPEED if self.velocity is None else self.velocity
+        # rad/s, m/s: of joints without a limit of their own
+        usual = 2.0 if self.velocity is None else self.velocity
         own = np.where((own > 0.0) & (own < UNLIMITED), own, usual)
         return own if self.velocity is None else np.minimum(own, self.velocity)
 
@@ -83,7 +82,8 @@ class Timing:
     def within(self) -> tuple[Array, Use]:
         """The frames of the fastest timing whose differences keep the limits, and how much of these they use."""
         slower = 1.0
-        for _ in range(SLOWINGS):
+        # a motion whose derivatives keep the limits is slowed until its frames do
+        for _ in range(10):
             q = self.frames(slower)
             use = used(self._figure, q, self._pace)
             over = max(use.velocity, np.sqrt(use.acceleration))

@@ -118,7 +118,7 @@ class SceneContents(checks.FixedAttributes):
     @property
     def built(self) -> SceneGeometry:
         """The geometry model of the present things, with its indices."""
-        return self._build()
+        return self._built or self._build()
 
     def frame_id(self, name: str) -> int:
         """Index of a frame of the figure."""

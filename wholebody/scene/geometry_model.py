@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from threading import Lock
@@ -117,7 +119,7 @@ class SceneGeometry:
         self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
         self._put_at: dict[str, int] = {}
         self._pools: dict[Any, Pool[Any]] = {}
-        self._known: dict[Any, Any] = {}
+        self._known: OrderedDict[Any, Any] = OrderedDict()
 
     def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
         """Put the pieces of an object to its placement in its joint's frame, or move them there along the way."""
@@ -166,11 +168,13 @@ class SceneGeometry:
         found: T | None = self._known.get(key)
         if found is None:
             found = make()
-        with self.lock:
-            self._known.pop(key, None)
-            self._known[key] = found
-            if len(self._known) > 64:
-                del self._known[next(iter(self._known))]
+            with self.lock:
+                self._known[key] = found
+                if len(self._known) > 64:
+                    self._known.popitem(last=False)
+            return found
+        with suppress(KeyError):  # another thread has just made room
+            self._known.move_to_end(key)
         return found
 
     def between(self, owners: Set[tuple[str, str]]) -> Mask:

@@ -18,7 +18,6 @@ NEIGHBOURS = 2  # answers of others that are tried for one problem, for each of 
 # more, and cost where there is no answer
 TRIES = 4  # more solves of a case whose posture jumps: its own start, both neighbours, and one that changed since
 JUMP = radians(10.0)  # a posture that turns a joint further from one case to the next is another strategy
-LOWER = 1e-3  # part of a measure: less is the tolerance of a solve, no better posture
 
 Pair = tuple[int, int]
 Work = Mapping[Any, tuple[Any, ...]]
@@ -109,7 +108,8 @@ def lower(family: Family) -> bool:
             if (k, j) in found:
                 best[k] = min(best.get(k, (np.inf, 0)), (found[k, j]["measure"], j))
         for k, (measure, j) in best.items():
-            if measure < done[k].measure - LOWER * abs(done[k].measure):
+            # a share of the measure: less is the tolerance of a solve, no better posture
+            if measure < done[k].measure - 1e-3 * abs(done[k].measure):
                 neighbour = "" if j < 0 else order[j].record.name
                 if keep(k, replace(order[k].record, **found[k, j], neighbour=neighbour)):
                     return True

@@ -37,9 +37,11 @@ def in_words(term: object) -> str:
 
 def is_own(term: object) -> bool:
     """Whether a term is of a class of one's own, or stands for one."""
-    inner = getattr(term, "term", getattr(term, "goal", None))
     kind: Any = type(term)
-    return not _is_ours(kind) or (inner is not None and is_own(inner))
+    if not _is_ours(kind):
+        return True
+    inner = vars(term).get("goal")  # that `Soft` stands for
+    return inner is not None and is_own(inner)
 
 
 @lru_cache(maxsize=256)

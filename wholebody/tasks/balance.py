@@ -126,11 +126,12 @@ def hull_corners(points: Array) -> list[int]:
                 ax, ay = places[chain[-2]]
                 along, across = x - ax, y - ay
                 # Height [m] of a corner over the line through its neighbours below which it is no corner.
-                if (bx - ax) * across - (by - ay) * along > 1e-6 * hypot(along, across):
+                turn = (bx - ax) * across - (by - ay) * along
+                if turn > 0.0 and turn > 1e-6 * hypot(along, across):
                     break
                 chain.pop()
                 bx, by = ax, ay
-            if hypot(x - bx, y - by) > NEAREST:
+            if abs(x - bx) > NEAREST or hypot(x - bx, y - by) > NEAREST:
                 chain.append(k)
                 bx, by = x, y
         return chain

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from functools import lru_cache
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, TermError, UndefinedTermError, either
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import UNIT_TOLERANCE, State, Wrench
+from wholebody.geometry.placement import FARTHEST
 from wholebody.tasks import answers
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
+
+T = TypeVar("T")
 
 _ASKED = (("error", 1), ("value", 1), ("jacobian", 1), ("gradient", 1), ("curvature", 1), ("squares", 1), ("bounds", 2))
 """What terms are asked at a state, and of how many arguments."""
@@ -25,13 +30,25 @@ def checked_terms(terms: Any, kinds: type | tuple[type, ...], what: str) -> Sequ
     """Terms of some kinds, given as the argument `what` of a problem; InputError for anything else."""
     listed = checks.listed(terms, what, f"{what}=[...]")
     for number, term in enumerate(listed):
-        if not isinstance(term, kinds):
+        if not is_a(term, kinds):
             wanted = either(kind.__name__ for kind in (kinds if isinstance(kinds, tuple) else (kinds,)))
             home = next((name for name, taken in KINDS.items() if isinstance(term, taken)), "")
             home = "constraints" if home == "bounds" else home
             correction = f"give it in {home}=[...]" if home else "give terms such as wb.Hold('left_foot')"
             raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
     return listed
+
+
+def is_a(term: object, kinds: type[T] | tuple[type[T], ...]) -> TypeGuard[T]:
+    """`isinstance`, remembered by class: to ask an abstract class takes three times as long."""
+    kind: Any = type(term)
+    asked: Any = kinds
+    return _derives(kind, asked)
+
+
+@lru_cache(maxsize=256)
+def _derives(kind: Any, kinds: Any) -> bool:
+    return issubclass(kind, kinds)
 
 
 def owner_pair(scene: Any, pair: Any) -> tuple[str, str]:
@@ -136,3 +153,19 @@ def check_frozen(bounds: Iterable[Bound], scene: Surroundings, state: State) -> 
             joint = next(j for j in scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
             message = f"{type(bound).__name__} keeps {scene.model.names[joint.id]} where it starts"
             raise InputError(f"{message}, out of its limits; start it within them")
+
+
+def start_posture(scene: Surroundings, start: Array | str | Mapping[str, Array | str] | None) -> Array:
+    """The posture (nq,) that a problem starts at, of unit quaternions; InputError for anything else."""
+    figure = scene.figure
+    if start is None or isinstance(start, (str, Mapping)):
+        return np.array(figure.posture(figure.postures[0] if start is None else start), dtype=float)
+    q = checks.posture(start, scene.model.nq, "start")
+    figure.warn_of_angles(q, "start")
+    if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
+        raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
+    if scene.model.nq == scene.model.nv:
+        return np.array(q)
+    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
+        raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
+    return np.asarray(pin.normalize(scene.model, q), dtype=float)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from functools import lru_cache, partial
-from typing import Any, TypeGuard, TypeVar
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
+from wholebody.tasks.checks import is_a
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
@@ -26,25 +26,10 @@ from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
 
-KNEELS = 0.05  # m, rad: a `Stand` that misses less at the start is of one who kneels there
-
 UPRIGHT: tuple[type[Balance | LoadedBalance | Stand], ...] = (Balance, LoadedBalance, Stand)
 """Terms that say how somebody stands."""
 
-T = TypeVar("T")
-
 _effort, _rhythm = Effort(), Rhythm()
-
-
-def is_a(term: object, kinds: tuple[type[T], ...]) -> TypeGuard[T]:
-    """`isinstance`, remembered by class: to ask an abstract class takes three times as long."""
-    kind: Any = type(term)
-    return _derives(kind, kinds)
-
-
-@lru_cache(maxsize=256)
-def _derives(kind: Any, kinds: tuple[type, ...]) -> bool:
-    return issubclass(kind, kinds)
 
 
 def usual_measures(
@@ -147,9 +132,10 @@ def _bearing(scene: Surroundings, term: Constraint | Goal) -> tuple[int, ...]:
 
 def _placed(term: Constraint | Goal) -> tuple[int, ...]:
     """Joints of the frames between which a term places one; empty for others."""
-    owner = getattr(term, "residual", term)
-    known = (getattr(owner, "place", None), getattr(owner, "base", None))
-    return tuple(one.joint for one in known if isinstance(one, inputs.Place))
+    own = vars(term)
+    residual = own.get("residual")
+    known = (own.get("place"), own.get("base")) if residual is None else (residual.place, residual.base)
+    return tuple([one.joint for one in known if type(one) is inputs.Place])
 
 
 def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
@@ -169,7 +155,8 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
             upright = [abs(state.frame(shank.frame).rotation[2, 2]) for shank in shanks]
         missed = np.maximum(np.maximum(stand.lower - at_start, at_start - stand.upper), 0.0).max()
         # The ankles of who stands are as near to the ground as knees.
-        return bool(missed <= KNEELS) and max(upright) < 0.5
+        # m, rad: who misses a `Stand` by less at the start kneels there
+        return bool(missed <= 0.05) and max(upright) < 0.5
 
     stand = (one for one in terms if is_a(one, (Stand,)))
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
@@ -245,8 +232,9 @@ def _stands(
 ) -> bool:
     """Whether a person stands: both feet are held where they are at the start, and nothing else carries it."""
     figure = scene.figure
+    held = [term for term in terms if is_a(term, (Hold,)) and not term.residual.base.frame]
     feet_names = [body + foot for foot in FEET]
-    if not set(feet_names) <= set(figure.segments):
+    if not held or not set(feet_names) <= set(figure.segments):
         return False
     root = f"{body}root"
     if any(isinstance(bound, Freeze) and root in figure.joint_names(bound.joints) for bound in bounds):
@@ -255,11 +243,7 @@ def _stands(
         return False
     feet = {figure.place_of(foot).joint for foot in feet_names}
     mine = figure.bodies[body]
-    holds = [
-        term
-        for term in terms
-        if is_a(term, (Hold,)) and not term.residual.base.frame and (not body or term.residual.place.joint in mine)
-    ]
+    holds = [term for term in held if not body or term.residual.place.joint in mine]
     if {term.residual.place.joint for term in holds} != feet:
         return False
     placed = [term for term in holds if term.at is not None]  # the others are where they are at the start

@@ -75,7 +75,8 @@ class PlacementResidual(NamedTuple):
 
     def _turn(self, place: Any) -> Array:
         """(3, 3) from the orientation of the target to that of a placement."""
-        return np.asarray(place.rotation @ self.placement.rotation.T)
+        turn: Array = place.rotation @ self.placement.rotation.T
+        return turn
 
     def wrench(self, state: State) -> Wrench:
         """Derivative of `value`: m rows between the two joints."""

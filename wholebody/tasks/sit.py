@@ -92,7 +92,8 @@ class Sit(ContactTerm):
             parts.append(Level(place, left, seat))
         else:
             at_back = surface(scene, self.back, where)
-            upper = joined(scene, self.trunk, [*behind, *_trunk(scene, place, trunk)])
+            between = (joint for joint in scene.model.supports[trunk.joint] if joint > place.joint)
+            upper = joined(scene, self.trunk, [*behind, *segments_on(scene, between)])
             middle = seat.at(state)[0]
             side = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
             to_left = _level(cross(UP, side.at(state)[1][2]), where)
@@ -139,11 +140,6 @@ class AtAngles(NamedTuple):
         moves = np.zeros((len(self.idx_v), state.model.nv))
         moves[np.arange(len(self.idx_v)), self.idx_v] = 1.0
         return state.q[self.idx_q] - self.angles, moves
-
-
-def _trunk(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
-    """Segments between the pelvis and the last of the trunk, which is among them."""
-    return segments_on(scene, (joint for joint in scene.model.supports[trunk.joint] if joint > pelvis.joint))
 
 
 def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:

@@ -92,7 +92,8 @@ class Stand(TermOfParts):
             toes = [owner for owner in segments_beyond(scene, place.joint) if owner != foot]
             middle = np.zeros(3)
             if foot in self.knees:
-                bears, end = _knee(scene, place, foot), joined(scene, f"{foot}'s foot", toes)
+                above = segments_on(scene, [int(scene.model.parents[place.joint])])  # its end at the knee rests too
+                bears, end = joined(scene, foot, [foot, *above]), joined(scene, f"{foot}'s foot", toes)
                 parts += [Gap(bears, thing, ground), Gap(end, thing, ground)]
                 ahead = np.asarray(rest.data.oMi[int(scene.model.supports[place.joint][1])].rotation[:, 0])
                 lows = [_lows(sole, rest, ahead, FLESH), _lows(end, rest, ahead, STANDING_HEIGHT)]
@@ -183,11 +184,6 @@ class Stance(SumOfSquares):
         rows[2] = between(state, np.append(np.zeros(3), cross(ahead, left))[None], joints[1], joints[0])[0]
         factors = np.sqrt(STANCE_WEIGHTS)
         return factors * (values - self.rest), factors[:, None] * rows
-
-
-def _knee(scene: Surroundings, place: inputs.Place, shank: str) -> Surface:
-    """A shank with the segment above it, whose end at the knee rests beside it."""
-    return joined(scene, shank, [shank, *segments_on(scene, [int(scene.model.parents[place.joint])])])
 
 
 def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[list[Array], list[int]]:

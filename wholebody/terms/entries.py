@@ -87,13 +87,13 @@ def placement_floats(place: Any) -> Array:
 
 def _residual(residual: PlacementResidual) -> list[Entry]:
     place, target, base, position, orientation = residual
-    based, floats = base.frame != WORLD.frame, np.zeros(36)
-    floats[:12] = placement_floats(place.placement)
+    based, floats = base.frame != WORLD.frame, np.zeros((12, 3))
+    floats[:4] = place.placement.homogeneous.T[:, :3]
     if based:
-        floats[12:24] = placement_floats(base.placement)
-    floats[24:27], floats[27:] = target.translation, target.rotation.ravel()
+        floats[4:8] = base.placement.homogeneous.T[:, :3]
+    floats[8], floats[9:] = target.translation, target.rotation
     integers = place.joint, base.joint, int(position), int(orientation), int(based)
-    return [Entry(RESIDUAL, integers, floats, 3 * (position + orientation))]
+    return [Entry(RESIDUAL, integers, floats.reshape(36), 3 * (position + orientation))]
 
 
 def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:

@@ -73,12 +73,17 @@ def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], u
         "index": _differences(np.concatenate([patch.faces, patch.coarse]).reshape(-1, 1), "<u2"),
         "fine": patch.faces.size,
         "color": [float(part) for part in color],
-        "contacts": {
-            "touch": list(LOOK.contact[:3]), "overlap": list(LOOK.penetration[:3]),
-            "radius": LOOK.patch_radius, "share": LOOK.patch,
-        },
-    }  # fmt: skip
+        "contacts": contact_paint(),
+    }
     return Command(Op.OBJECT, path, "", pack(message))
+
+
+def contact_paint() -> dict[str, Any]:
+    """How the page paints a body around its contacts: colours, red, green, blue, of a radius [m], and their share."""
+    return {
+        "touch": list(LOOK.contact[:3]), "overlap": list(LOOK.penetration[:3]),
+        "radius": LOOK.patch_radius, "share": LOOK.patch,
+    }  # fmt: skip
 
 
 def _numbers(values: Any, kind: str) -> bytes:

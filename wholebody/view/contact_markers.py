@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from wholebody.tracking.overlaps import Overlap
 
 _DEPTH, _GLOBAL = Marker("arrow", LOOK.depth, 1.3), Marker("arrow", LOOK.global_depth, 1.3)
-_CANCELLED = 0.1  # of the deepest overlap: a shorter PD_g has no use as a direction
 
 
 def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
@@ -80,7 +79,8 @@ def mark_overlaps(keyframe: Keyframe, bodies: Bodies, data: Any, overlaps: Seque
     for number, one in enumerate(overlaps):
         root, depth = f"{LOOK.contact_node}/overlap {number}", float(np.linalg.norm(one.depth))
         moves = (one.moves_first, one.moves_second)
-        cancelled, end = depth < _CANCELLED * one.deepest and one.pairs > 1, one.point
+        # a PD_g much shorter than the deepest overlap has no use as a direction
+        cancelled, end = depth < 0.1 * one.deepest and one.pairs > 1, one.point
         for name, move in zip(("first", "second"), moves, strict=True):
             length = float(np.linalg.norm(move))
             if length < 1e-9 or cancelled:  # m: shorter moves are none

@@ -82,9 +82,6 @@ def _shape(geometry: Any, name: str) -> tuple[Three, tuple[float, float, float],
         return plate, one, plate_placement(np.asarray(geometry.n), float(geometry.d)), True
     if kind == "Convex":
         return _triangles(np.asarray(geometry.points()), convex_faces(geometry), None), one, None, True
-    if kind.startswith("BVHModel"):
-        faces = [[geometry.tri_indices(i)[k] for k in range(3)] for i in range(geometry.num_tris)]
-        return _triangles(np.asarray(geometry.vertices()), np.array(faces, dtype=np.uint32), None), one, None, True
     raise InputError(f"{name}: coal's {kind} cannot be drawn; turn it into convex pieces")
 
 

@@ -24,7 +24,6 @@ from wholebody.view.viser_server import viser_server
 
 SETTLING = 90  # frames after the mouse or a key lets go in which the figure still follows to where that was
 STILL = 1e-5  # m, rad: what moves less is not sent
-PRESS = 0.01  # m that a handle moves at a press of an arrow key; a key that stays down repeats some 30 times a second
 
 KEYS = """arrow keys move the chosen handle, shift with up and down moves it away and back, Escape: {escape}
 <img src="data:," hidden onerror="document.documentElement.addEventListener('keydown', event =>
@@ -260,7 +259,8 @@ class LivePage:
             away[2] = 0.0
             away /= max(float(np.linalg.norm(away)), 1e-9)
             right = np.array((away[1], -away[0], 0.0))
-            self._target = self._target + PRESS * (np.array((right, away, (0.0, 0.0, 1.0))).T @ way)
+            # m: a press of an arrow key; a key that stays down repeats some 30 times a second
+            self._target = self._target + 0.01 * (np.array((right, away, (0.0, 0.0, 1.0))).T @ way)
             self._settling = SETTLING
 
     def _constrained(self, drag: LiveDrag, name: str, _: Any) -> None:

@@ -6,6 +6,7 @@ import base64
 import gzip
 import html
 import importlib.util
+import json
 import re
 import sys
 from collections.abc import Iterable
@@ -16,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.errors import MissingPackageError
+from wholebody.view.commands import contact_paint
 from wholebody.view.server import Command, bundle
-
-LARGE = 2_000  # bytes of a command that scenes of a notebook share
 
 
 def live_page(title: str = "wholebody") -> str:
@@ -46,7 +46,8 @@ def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
         if cell is not None and carrier[0] == cell[0] and carrier != cell:  # what an earlier run of this cell had
             del _carriers[name]
     parts = [player() if _is_first(cell, "player") else _data("player")]
-    for large, some in groupby(commands, lambda command: len(command.payload) > LARGE):
+    # bytes of commands that scenes of a notebook share
+    for large, some in groupby(commands, lambda command: len(command.payload) > 2_000):
         content = _bundled(some)
         name = sha256(content).hexdigest()[:16] if large else f"scene {len(parts)}"
         parts.append(_data(name, content if not large or _is_first(cell, name) else None))
@@ -76,7 +77,8 @@ def player() -> str:
 
 def picture_page() -> str:
     """HTML of an empty page for `Screenshots`: it gets its commands from outside, and draws only when asked to."""
-    return _page("wholebody", _script(_meshcat_script()) + _script(_file("page.js")), " data-still")
+    still = html.escape(json.dumps(contact_paint()), quote=True)
+    return _page("wholebody", _script(_meshcat_script()) + _script(_file("page.js")), f' data-still="{still}"')
 
 
 def _page(title: str, parts: str, still: str = "") -> str:

@@ -115,7 +115,6 @@ def _read(path: Path, kind: tuple[str, ...], human: wb.Figure, frames: int) -> d
 
 
 TOOLS = ("wholebody", "mink, GMR's weights")
-SLOWEST = 60.0  # Hz: recordings at more than twice this rate are subsampled
 
 
 def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator[Row]:
@@ -142,7 +141,8 @@ def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator
 
 
 def _thinned(motion: SkeletonMotion) -> SkeletonMotion:
-    every = max(1, round(1.0 / (motion.dt * SLOWEST)))
+    # recordings at more than twice 60 Hz are subsampled
+    every = max(1, round(1.0 / (motion.dt * 60.0)))
     parts = motion.rotations[::every], motion.positions[::every]
     return SkeletonMotion(motion.names, motion.parents, motion.offsets, *parts, motion.dt * every, motion.name)
 

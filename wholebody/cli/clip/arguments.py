@@ -27,8 +27,10 @@ def _figure(parser: argparse.ArgumentParser) -> None:
     )
 
 
-ONE_MOTION: tuple[Option, ...] = (option("file", type=Path, metavar="FILE", help="the motion"), _figure)
-"""The file of a motion, and the figure that it moves."""
+SCENE = option("--scene", type=Path, metavar="TASK.toml", help="task file with the figures and their things")
+
+ONE_MOTION: tuple[Option, ...] = (option("file", type=Path, metavar="FILE", help="the motion"), _figure, SCENE)
+"""The file of a motion, and the figure or the scene that it moves."""
 
 MOTIONS: tuple[Option, ...] = (option("files", type=Path, nargs="+", metavar="FILE", help="the motions"), _figure)
 
@@ -37,8 +39,6 @@ EQUIPMENT = option(
     help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back; "
     "repeated, each in turn",
 )  # fmt: skip
-
-SCENE = option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things")
 
 PAGE = option("--html", type=Path, metavar="FILE", help="write curves over time and a film beside the recording")
 
@@ -78,7 +78,7 @@ def skeleton_of(path: Path, frames: int) -> SkeletonMotion | None:
 
 
 def clip_of(arguments: argparse.Namespace) -> Clip:
-    """Read the clip of the figure."""
+    """Read the clip of the figure, or of the figures of the scene."""
     from wholebody.motion.reading import read_clip
 
-    return read_clip(arguments.file, figure_of(arguments))
+    return read_clip(arguments.file, scene_of(arguments).figure)

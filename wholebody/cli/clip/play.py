@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import ONE_MOTION, clip_of, skeleton_of
+from wholebody.cli.clip.arguments import ONE_MOTION, scene_of, skeleton_of
 from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from wholebody.view.viewer import Viewer
 
 NOTHING = "nothing"
-PICTURES = 8
 ENDINGS = (".glb", ".htm", ".html", ".mp4", ".gif", ".png")
 
 
@@ -25,7 +24,7 @@ ENDINGS = (".glb", ".htm", ".html", ".mp4", ".gif", ".png")
     """\
 Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
 without a network (.html), as glTF (.glb), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its
-ghost. With --equipment the body is shown with what it wears.""",
+ghost. With --equipment the body is shown with what it wears, with --scene the figures among their things.""",
     *ONE_MOTION,
     option("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent"),
     option(
@@ -41,13 +40,14 @@ ghost. With --equipment the body is shown with what it wears.""",
         help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
     ),
     option("--out", type=Path, metavar="OUT", help=".html, .glb, .mp4, .gif or .png"),
-    option("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)"),
+    option("--pictures", type=int, default=8, metavar="N", help="of a strip (default: 8)"),
     epilog="""\
 examples:
   wholebody clip play walk.bvh
   wholebody clip play free.npz --ghost walk.npz --out before-after.html
   wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack
-  wholebody clip play walk-free.npz --beside walk.bvh --equipment pack --out film.mp4""",
+  wholebody clip play walk-free.npz --beside walk.bvh --equipment pack --out film.mp4
+  wholebody clip play carried.npz --scene two-people.toml""",
 )
 def run(arguments: argparse.Namespace) -> int:
     """Show or write the motion."""
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.figures.postures import lowest
     from wholebody.geometry.shapes import HalfSpace
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.worn_equipment import dressed
+    from wholebody.motion.worn_equipment import put_on
     from wholebody.view import Viewer
     from wholebody.view.screenshot import check_movie
     from wholebody.view.side_by_side import write_filmstrip
@@ -72,17 +72,17 @@ def run(arguments: argparse.Namespace) -> int:
         checked_target(out, "--out", "a clip's picture", ENDINGS, [arguments.file, arguments.ghost, arguments.beside])
         if out.suffix.lower() == ".mp4":
             check_movie(out)
-    clip = clip_of(arguments)
+    scene = put_on(scene_of(arguments), arguments.equipment)
+    clip = read_clip(arguments.file, scene.figure)
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):
         raise InputError(f"--ghost: {arguments.ghost.name} has {len(ghost)} frames and not {len(clip)}")
     if arguments.beside is not None:
         if ghost is not None or (out is not None and out.suffix.lower() == ".png"):
             raise InputError("--beside shows motions side by side, as a page or a movie; leave out --ghost, and .png")
-        viewer = _beside(arguments.beside, clip, dressed(clip.figure, arguments.equipment))
+        viewer = _beside(arguments.beside, clip, scene)
         return _written(viewer, out)
-    scene = dressed(clip.figure, arguments.equipment)
-    if clip.figure.root == "free":
+    if clip.figure.root == "free" and arguments.scene is None:
         floor = min(lowest(clip.figure, q) for q in clip.q)  # recordings do not all have it at 0
         scene.add(HalfSpace(), name="floor", at=(0.0, 0.0, floor))
     with Viewer(scene, title=clip.name) as viewer:

@@ -20,10 +20,6 @@ from wholebody.geometry.pair_distances import PairDistances
 from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.geometry.proximity import PairTable
 
-FINEST = 2.0**-12
-"""Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets the
-depth that it may have."""
-
 SHARP = 0.1
 """Share of the tolerance that decides: a pair found to be less deep than the tolerance by this much is looked at until
 it is proved to be less deep than the tolerance. A smaller share makes more queries of coal."""
@@ -130,7 +126,8 @@ class SweptDepth:
             parts = self._kernel.Parts(numbers, first, last, rows0, rows1, speed[numbers], -allowed)
             motion = self._kernel.Speeds(self._bounds.turn, self._bounds.speed, self._bounds.carries)
             self._kernel.lower_bounds(parts, stack.places, self._shapes, motion, share, ACCURACY, least)
-            kept = least >= -allowed if share > FINEST else np.ones(len(which), dtype=bool)
+            # The shortest parts, 0.02 mm of a hand: what is in doubt there gets the depth that it may have.
+            kept = least >= -allowed if share > 2.0**-12 else np.ones(len(which), dtype=bool)
             np.maximum.at(bound, which[kept], -least[kept])
             going = np.flatnonzero(~kept)
             if not len(going):

@@ -26,7 +26,6 @@ from wholebody.scene.scene import Scene
 BUDGET = 42  # queries and goals after which a frame makes no further step, and the next one continues: some 3 ms
 OVERRUN = 16  # further queries and goals after which no chain is processed any more
 LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by less than this stays where it is
-ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
 
 
 @dataclass(frozen=True)
@@ -272,7 +271,8 @@ class FrameResolver:
             q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
             q = self._resolver.into_cones(q)
             overlaps, sweep = self._resolver.query(q), self._workspace.sweep
-            if not overlaps and sweep.first_contact(q0, q, None, 2.0 * ALLOWED_DEPTH) is None:
+            # m: twice the allowed depth of the direct motion from one shown posture to the next
+            if not overlaps and sweep.first_contact(q0, q, None, 8e-4) is None:
                 return q
         return None
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array
 from wholebody.methods.control import Control
 from wholebody.methods.newton.batches import ONE_SIDED, Batch, with_world
 from wholebody.methods.newton.figure_bodies import FigureBodies
@@ -56,7 +56,8 @@ class System:
         rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
         self._masks = []
         for batch, start in zip(self.batches, self.starts, strict=False):
-            column = _columns(batch)
+            # (k, 7 b) columns of the variables of each equation; negative for those of the world
+            column = (7 * batch.bodies[:, :, None] + np.arange(7)).reshape(len(batch), -1)
             row = start + np.arange(len(batch) * batch.size).reshape(len(batch), batch.size, 1)
             mask = batch.pattern[None] & (column >= 0)[:, None, :]
             self._masks.append(np.flatnonzero(mask))
@@ -111,11 +112,6 @@ class System:
         index = int(np.searchsorted(self.starts, row, side="right")) - 1
         batch = self.batches[index]
         return batch.labels[(row - int(self.starts[index])) // batch.size]
-
-
-def _columns(batch: Batch) -> Indices:
-    """(k, 7 b) columns of the variables of each equation; negative for those of the world."""
-    return (7 * batch.bodies[:, :, None] + np.arange(7)).reshape(len(batch), -1)
 
 
 def unit(x: Array) -> Array:

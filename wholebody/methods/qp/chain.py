@@ -9,6 +9,7 @@ keeps every clearance is an answer; the others are rejected.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
-from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain
+from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain, rows_of
 from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -100,7 +101,8 @@ class Asked(NamedTuple):
         """What a problem with these entries asks, and its measure where that is a squared distance."""
         at = problem.scene.figure.clamp(problem.start)
         distance = distance_of(problem, chain) if measures else None
-        nearest = np.array([chain.angles(at if distance is None else distance.reference), np.zeros(len(chain.idx_v))])
+        nearest = np.zeros((2, len(chain.idx_v)))
+        nearest[0] = chain.angles(at if distance is None else distance.reference)
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
         return cls(chain.goals(entries), at, nearest, problem.clearances), distance
@@ -128,6 +130,7 @@ class Descents:
     ) -> None:  # fmt: skip
         self.asked, self.chain, self.workspace, self.settings, self.control = asked, chain, workspace, settings, control
         self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
+        self.within = float(np.maximum.reduce(asked.clearances, initial=0.0))
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
@@ -202,7 +205,8 @@ class Descents:
         if len(found) and self.workspace.model.nv > len(self.start):
             return False  # others may make room
         deep = clearances - SEEDS.deep
-        return not any(is_free(self.workspace, chain.posture(values, at), deep) for values in found)
+        within = max(0.0, self.within - SEEDS.deep)
+        return not any(is_free(self.workspace, chain.posture(values, at), deep, within) for values in found)
 
     def _nearest(self) -> Met:
         """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
@@ -303,13 +307,17 @@ class Descents:
         return float(self.asked.nearest[1].dot(away * away))
 
     def _is_free(self, q: Array) -> bool:
-        return is_free(self.workspace, q, self.asked.clearances)
+        return is_free(self.workspace, q, self.asked.clearances, self.within)
 
 
 def how_far(settings: Settings, enough: int, others: bool = False) -> Array:
     """Numbers (5,) of `chain_kernel.reach`; `others`: those too that will take more effort than what is found."""
-    steps = min(settings.iterations, SEEDS.steps)
-    return np.array([settings.tolerance, SEEDS.damping**2, steps, enough, 0.0 if others else 1.0])
+    return _how_far(settings.tolerance, min(settings.iterations, SEEDS.steps), enough, others)
+
+
+@lru_cache(maxsize=64)
+def _how_far(tolerance: float, steps: int, enough: int, others: bool) -> Array:
+    return np.array([tolerance, SEEDS.damping**2, steps, enough, 0.0 if others else 1.0])
 
 
 class Rule(NamedTuple):
@@ -335,14 +343,13 @@ class Rule(NamedTuple):
         held = guided and chain.held >= 0
         finite = guided and not held and chain.arm is not None
         enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
-        rows = sum(3 * int(each[3] + each[4]) for each in goals.entries)
         nearly = guided and chain.first > 0 and measured
-        return cls(guided, held, finite, enough, rows, SEEDS.together * more, measured, nearly)
+        return cls(guided, held, finite, enough, rows_of(goals), SEEDS.together * more, measured, nearly)
 
 
-def is_free(workspace: Workspace, q: Array, clearances: Array) -> bool:
-    """Whether every pair keeps its clearance (pairs,) at a posture (nq,)."""
-    near = workspace.near_views(q, float(np.maximum.reduce(clearances, initial=0.0)))
+def is_free(workspace: Workspace, q: Array, clearances: Array, within: float) -> bool:
+    """Whether every pair keeps its clearance (pairs,), at most `within` metres, at a posture (nq,)."""
+    near = workspace.near_views(q, within)
     return not len(near.number) or not (near.distance < clearances[near.number]).any()
 
 
@@ -352,8 +359,10 @@ def distance_of(problem: Problem, chain: PlainChain) -> SquaredDistance | None:
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
         return None
     distance: SquaredDistance = measures[0].distance  # type: ignore[attr-defined]
-    if not distance.weights[chain.idx_v].all():
+    if np.count_nonzero(distance.weights[chain.idx_v]) < len(chain.idx_v):
         return None
+    if len(chain.idx_v) == len(distance.weights):
+        return distance
     weights = distance.weights.copy()
     weights[chain.idx_v] = 0.0
     if not weights.any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from wholebody.assessment.posture import assess
+from wholebody.assessment.posture import judged
 from wholebody.base.arrays import Array
 from wholebody.base.checks import posture, shown
 from wholebody.base.errors import InputError
@@ -109,7 +109,7 @@ class QP(Settings, Descends):
 
     def _complete(self, problem: Problem, met: Met | None) -> Ending | None:
         """The end of descents of a chain; None where they leave something to do."""
-        judgement = assess(problem, met.q) if met is not None and met.complete else None
+        judgement = judged(problem, met.q) if met is not None and met.complete else None
         if met is None or judgement is None or not meets(judgement, self.tolerance):
             return None
         return Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)

@@ -48,8 +48,12 @@ class PlainChain:
         subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
         placements = [model.jointPlacements[joint] for joint in joints]
         self._number = number
+        self._integers: dict[tuple[tuple[int, ...], ...], NDArray[np.int64]] = {}
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
         self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
+        first, last = int(self._idx_q[0]), int(self._idx_q[-1]) + 1
+        alone = not len(self._round) and (self._idx_q == np.arange(first, first + len(kinds))).all()
+        self._places = slice(first, last) if alone else self._idx_q  # a slice is read in a fifth of the time
         self.idx_v = np.array([kind.idx_v for kind in kinds], dtype=np.intp)
         lower, upper = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
         lower[limits.idx_v], upper[limits.idx_v] = limits.lower, limits.upper
@@ -72,8 +76,8 @@ class PlainChain:
         self.first = int(self.arm is None and self.guide is not None)  # it lacks postures of an arm that is stretched
 
     def angles(self, q: Array) -> Array:
-        """Values (..., n) of the joints at postures (..., nq)."""
-        values: Array = q[..., self._idx_q]
+        """Values (..., n) of the joints at postures (..., nq); may be a view of these."""
+        values: Array = q[..., self._places]
         if len(self._round):
             values[..., self._round] = np.arctan2(q[..., self._idx_q[self._round] + 1], values[..., self._round])
         return values
@@ -81,7 +85,7 @@ class PlainChain:
     def posture(self, values: Array, at: Array) -> Array:
         """Postures (..., nq) with values (..., n) of the joints."""
         q: Array = at.copy()
-        q[..., self._idx_q] = values
+        q[..., self._places] = values
         if len(self._round):
             turned = values[..., self._round]
             q[..., self._idx_q[self._round]], q[..., self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
@@ -89,11 +93,15 @@ class PlainChain:
 
     def goals(self, entries: list[Entry]) -> Goals:
         """Entries of goals with the numbers of these joints."""
-        integers, row = np.empty((len(entries), 6), dtype=np.int64), 0
-        for k, entry in enumerate(entries):
-            joint, base, *kinds = entry.integers
-            integers[k] = row, self._number[joint], self._number[base], *kinds
-            row += entry.rows
+        kinds = tuple([entry.integers for entry in entries])
+        integers = self._integers.get(kinds)
+        if integers is None:
+            integers, row = np.empty((len(entries), 6), dtype=np.int64), 0
+            for k, entry in enumerate(entries):
+                joint, base, *kind = entry.integers
+                integers[k] = row, self._number[joint], self._number[base], *kind
+                row += entry.rows
+            self._integers[kinds] = integers
         return Goals(np.array([entry.floats for entry in entries]), integers)
 
     def room(self, rows: int) -> Room:
@@ -143,7 +151,7 @@ class PlainChain:
         lower, upper = self.chain.lower.copy(), self.chain.upper.copy()
         lower[self.held] = upper[self.held] = values[self.held]
         chain, size = with_values(self.chain, lower=lower, upper=upper), len(values)
-        room, found = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries)), np.empty((1, 4))
+        room, found = self.room(rows_of(goals)), np.empty((1, 4))
         at_rest = np.array([values, np.zeros(size)])
         compiled_kernel().reach(chain, goals, room, values[None], at_rest, asked, np.zeros(1), found)
         return values if found[0, 1] < np.inf else None
@@ -176,8 +184,7 @@ class PlainChain:
     ) -> tuple[Array, Indices]:
         """Descend for k problems from branches of the closed form, or `seeds` given ones; writes `ends` (k, m, n)."""
         # `tables` (k, e, 36) of goals. What was found (k, m, 4), how many (k,); -1 for more than there is room for.
-        room = self.room(sum(3 * int(each[3] + each[4]) for each in goals.entries))
-        found, counts = np.empty((*ends.shape[:2], 4)), np.full(len(ends), seeds)
+        room, found, counts = self.room(rows_of(goals)), np.empty((*ends.shape[:2], 4)), np.array([seeds] * len(ends))
         arm = _NO_ARM if seeds or self.guide is None else self.guide
         if self.first and not seeds:
             ends[:, 0], counts[:] = np.clip(nearest[:, 0], self.chain.lower, self.chain.upper), self.first
@@ -219,6 +226,16 @@ class Chains:
     def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
         """The chain that carries the frames of goals."""
         return self.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
+
+
+def rows_of(goals: Goals) -> int:
+    """How many rows the goals have."""
+    return _rows(goals.entries.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _rows(entries: bytes) -> int:
+    return 3 * int(np.frombuffer(entries, dtype=np.int64).reshape(-1, 6)[:, 3:5].sum())
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,7 @@ from wholebody.base.files import write as write_file
 from wholebody.figures.description import Member
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
-from wholebody.figures.link_pieces import Color, Drawn, drawn_of, triangles_of
+from wholebody.figures.link_pieces import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
 from wholebody.geometry.gltf import VERTICES, GltfBuilder
 from wholebody.motion.files.base import Motion
@@ -185,7 +185,7 @@ def keys_of(model: Any, q: Array) -> tuple[Array, Array]:
 
 def triangles(shape: Any) -> Any:
     """A trimesh of a coal shape, about the shape's own origin; a square of a half-space."""
-    from trimesh import Trimesh, convex, creation, geometry
+    from trimesh import convex, creation, geometry
 
     if isinstance(shape, coal.Halfspace):
         wide, thin = 6.0, 1e-3  # m: of the piece of a half-space that is drawn
@@ -207,6 +207,4 @@ def triangles(shape: Any) -> Any:
         return mesh
     if isinstance(shape, coal.Ellipsoid):
         return creation.icosphere().apply_scale(np.array(shape.radii))
-    if isinstance(shape, coal.BVHModelBase):
-        return Trimesh(*triangles_of(shape), process=False)
     return convex.convex_hull(np.array(shape.points()))

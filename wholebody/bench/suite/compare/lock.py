@@ -127,15 +127,12 @@ def differences(published: Locked, found: Locked) -> list[Difference]:
         raise InputError(
             "the two comparisons have no figure in common; give the lock file of the same sets and methods"
         )
+    pairs = [(key, published.figures[key], found.figures[key]) for key in common]
     return [
-        Difference(*key, published.figures[key], found.figures[key])
-        for key in common
-        if _apart(published.figures[key], found.figures[key])
+        Difference(*key, one, other)
+        for key, one, other in pairs
+        if not (one.low <= other.value <= one.high or other.low <= one.value <= other.high)
     ]
-
-
-def _apart(one: Interval, other: Interval) -> bool:
-    return not (one.low <= other.value <= one.high or other.low <= one.value <= other.high)
 
 
 def in_words(published: Locked, found: Locked) -> list[str]:
