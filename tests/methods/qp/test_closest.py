@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-
 from scipy.optimize import least_squares
 
 import wholebody as wb
