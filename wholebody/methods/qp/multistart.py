@@ -308,8 +308,6 @@ class Multistart:
         tolerance = self.settings.tolerance
         if self.control.over:
             return
-        if self._near is not None and SEARCH.agree * self._near.violation.total < self.best.violation.total:
-            self._accept(self._ran(self._closest(), self._probe(self._near.q, 0.0).q), self.how)
         if self.out_of_reach:
             local = self._ran(self._closest(), self.best.q)
             if not held(local, tolerance) and local.violation.total < self.best.violation.total:
@@ -319,6 +317,8 @@ class Multistart:
             self._accept(self._stay(self.best), self.how)
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
+        if self._near is not None and SEARCH.agree * self._near.violation.total < self.best.violation.total:
+            self._accept(self._ran(self._closest(), self._probe(self._near.q, 0.0).q), self.how)
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
