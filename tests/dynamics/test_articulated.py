@@ -367,3 +367,22 @@ def test_a_box_comes_to_rest_on_a_hand() -> None:
         fastest = max(fastest, np.abs(world.engine.twist("box")).max() if number > 50 else 0.0)  # type: ignore[union-attr]
     assert frame.impulses["box"] == pytest.approx((0.0, 0.0, 0.5 * 9.81 * DT), abs=1e-3)
     assert fastest < 5e-3  # m/s, rad/s; 0.05 where a step moved it as if nothing bore it
+
+
+def test_friction_stops_nothing_where_a_figure_moves_along_the_normal_alone(tmp_path: Path) -> None:
+    path = tmp_path / "ram.urdf"
+    path.write_text(
+        """<robot name="ram"><link name="frame"/><link name="head"><inertial><mass value="2"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+        <collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+        <joint name="slide" type="prismatic"><parent link="frame"/><child link="head"/><origin xyz="0 0 0.5"/>
+        <axis xyz="0 0 1"/><limit lower="-5" upper="5" effort="1" velocity="9"/></joint></robot>"""
+    )
+    ram = wb.load(path)
+    scene = wb.Scene(ram).add(wb.Box((1.0, 1.0, 0.2)), name="block", at=(0.0, 0.0, -0.1))
+    world = wb.World(scene, ram.neutral, spring=wb.Actuated(ram, stiffness=0.0, damping=0.0))
+    heights = np.array([world.step().q[0] for _ in range(60)])
+    falling = 0.5 * 9.81 * (DT * np.arange(1, 17)) ** 2  # it meets the block after 0.286 s
+    assert heights[:16] == pytest.approx(-falling, abs=1e-6)
+    assert heights[-1] == pytest.approx(-0.4, abs=1e-3)
+    assert np.abs(world.velocity).max() < 1e-3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 import wholebody as wb
@@ -113,3 +114,27 @@ def test_a_balance_on_tiptoe_is_left_out_with_a_note(scene: wb.Scene) -> None:
     for asked in ({"balance": True}, {"constraints": [LEFT, RIGHT, wb.Balance()]}):
         with pytest.raises(wb.InputError, match="line"):
             wb.Problem(scene, tiptoe, **asked)  # type: ignore[arg-type]
+
+
+class Straight(wb.Goal):
+    """A straight right elbow; the names of its attributes are those of other terms."""
+
+    angular = np.array(True)
+
+    def __init__(self, scene: wb.Scene) -> None:
+        self.residual, self.place, self.base = np.zeros(1), "elbow", None
+        self.joint = scene.model.joints[scene.model.getJointId("right_elbow_flexion")]
+
+    def error(self, state: wb.State) -> Any:
+        return state.q[self.joint.idx_q : self.joint.idx_q + 1]
+
+    def jacobian(self, state: wb.State) -> Any:
+        return np.eye(1, state.model.nv, self.joint.idx_v)
+
+
+def test_attributes_of_an_own_goal_are_its_own(scene: wb.Scene) -> None:
+    problem = wb.Problem(scene, goals=[Straight(scene)], constraints=[LEFT, RIGHT])
+    arms = [term.arms for term in problem.measures if isinstance(term, wb.tasks.Hang)]
+    assert arms == [("left_upper_arm",)]
+    problem.goals = [Straight(scene)]
+    assert wb.solve(problem).solved

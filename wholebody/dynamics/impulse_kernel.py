@@ -48,9 +48,10 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
             now = max(0.0, held + (target[c] - velocity[row]) / own)
             if own <= 1e-12 or (now == 0.0 and held == 0.0):
                 continue
-            step, one, two, side = now - held, 0.0, 0.0, 0.0
-            if friction[c] > 0.0:  # one step along both axes, with a bound of the mobility along any
-                side = max(mobility[row + 1, row + 1], mobility[row + 2, row + 2]) + abs(mobility[row + 1, row + 2])
+            step, one, two = now - held, 0.0, 0.0
+            # one step along both axes, with a bound of the mobility along any; 0 where nothing moves along them
+            side = max(mobility[row + 1, row + 1], mobility[row + 2, row + 2]) + abs(mobility[row + 1, row + 2])
+            if friction[c] > 0.0 and side > 1e-12:
                 one = impulse[c, 1] - (velocity[row + 1] + mobility[row + 1, row] * step) / side
                 two = impulse[c, 2] - (velocity[row + 2] + mobility[row + 2, row] * step) / side
                 size, bound = np.sqrt(one * one + two * two), friction[c] * now

@@ -51,7 +51,6 @@ BEND = 0.067  # s², weight of an acceleration of the deviation in sweeps, in me
 GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a deviation that nothing needs
 EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
-# s², weight of overlaps between frames over the square of the time step: less than of what rests, which they would move
 LATE = 1.3  # omega of sweeps that look at motions between frames: earlier ones are far from where these will be
 MENDED = 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
 KEPT = 30  # frames before the last one that stay known, for what looks back
@@ -380,7 +379,7 @@ class Run:
 
     def _midway(self, k: int) -> list[Midway]:
         """Where motions to the frames beside one overlap; it gives way by half to the next one, which does the rest."""
-        weight = 0.8 / self.dt**2
+        weight = 0.8 / self.dt**2  # 0.8 s²: less than the weight of what rests, which they would move
         found = [Midway(self._found[k - 1], 1.0 - share, 1.0, weight) for share in self._dips.get(k, ())]
         return found + [Midway(self._found[k + 1], share, 0.5, weight) for share in self._dips.get(k + 1, ())]
 

@@ -19,6 +19,7 @@ from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
 from wholebody.tasks.hang import Hang
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
+from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stance, Stand
@@ -133,8 +134,10 @@ def _bearing(scene: Surroundings, term: Constraint | Goal) -> tuple[int, ...]:
 def _placed(term: Constraint | Goal) -> tuple[int, ...]:
     """Joints of the frames between which a term places one; empty for others."""
     own = vars(term)
-    residual = own.get("residual")
-    known = (own.get("place"), own.get("base")) if residual is None else (residual.place, residual.base)
+    residual = own.get("residual")  # that of a class of one's own may be anything
+    known = own.get("place"), own.get("base")
+    if isinstance(residual, PlacementResidual):
+        known = residual.place, residual.base
     return tuple([one.joint for one in known if type(one) is inputs.Place])
 
 
