@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import least_squares
 
 import wholebody as wb
 from wholebody.methods.control import Control
@@ -113,3 +114,40 @@ def test_joints_that_follow_others_bend_with_them(tmp_path, honest):
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error == pytest.approx(2.0 - 0.9, abs=1e-3)
+
+
+def arm(seed, folder):
+    """An arm of four joints about any axes, with limits."""
+    rng = np.random.default_rng(seed)
+    parts = ["<robot name='arm'><link name='l0'/>"]
+    for k in range(1, 5):
+        at, axis, (low, high) = rng.uniform(-0.3, 0.3, 3), rng.normal(size=3), rng.uniform(0.3, 2.5, 2)
+        parts.append(
+            f"<link name='l{k}'/><joint name='j{k}' type='revolute'><parent link='l{k - 1}'/><child link='l{k}'/>"
+            f"<origin xyz='{' '.join(map(str, at))}'/><axis xyz='{' '.join(map(str, axis))}'/>"
+            f"<limit lower='{-low}' upper='{high}' effort='1' velocity='1'/></joint>"
+        )
+    end = "<link name='tip'/><joint name='end' type='fixed'><parent link='l4'/><child link='tip'/>"
+    path = folder / "arm.urdf"
+    path.write_text("".join(parts) + end + "<origin xyz='0 0 0.3'/></joint></robot>")
+    return wb.load(path)
+
+
+@pytest.mark.parametrize("seed", [6, 10, 18, 22, 24, 57])
+def test_out_of_reach_an_arm_comes_as_near_as_least_squares_from_many_starts(seed, tmp_path):
+    """Limits of joints leave several minima; a first descent ends 1.25 to 5 times as far away."""
+    figure = arm(seed, tmp_path)
+    model, data, tip, limits = figure.model, figure.model.createData(), figure.frame_id("tip"), figure.limits
+    rng = np.random.default_rng(seed)
+    target = rng.normal(size=3)
+    target /= np.linalg.norm(target)
+
+    def error(q):
+        pin.framesForwardKinematics(model, data, q)
+        return data.oMf[tip].translation - target
+
+    bounds = limits.lower, limits.upper
+    ends = [least_squares(error, rng.uniform(*bounds), bounds=bounds).fun for _ in range(30)]
+    solution = wb.solve(wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", target)]))
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error <= 1.1 * min(map(np.linalg.norm, ends)) + 1e-4

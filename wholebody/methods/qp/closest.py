@@ -141,16 +141,17 @@ class ReachTrials(NamedTuple):
 
     out_of_reach: bool  # whether enough of them rest at the same distance
     reached: Array | None  # (nq,) where one from another start than the first reaches them
+    nearest: LocalSolution | None  # of all ends that count and what was known the nearest; None without any
     spent: int  # programs
 
 
 def reach_trials(
-    reach: Closest, starts: Iterable[Array], nearest: float, agreeing: int, tolerance: float
+    reach: Closest, starts: Iterable[Array], near: LocalSolution | None, agreeing: int, tolerance: float
 ) -> ReachTrials:
     """Descend from each start (nq,) until one reaches the goals, or `agreeing` ends are equally near.
 
-    This is then the least that limits and constraints allow, if nothing known came nearer than `nearest`: local minima
-    differ.
+    This is then the least that limits and constraints allow, if no end came nearer than these, `near` among them: local
+    minima differ.
     """
     ends, spent = list[LocalSolution](), 0
     for number, begin in enumerate(starts):
@@ -158,14 +159,15 @@ def reach_trials(
         spent += local.iterations
         met = local.violation.worst <= reach.tolerance
         if met or reach.shared.control.over:
-            return ReachTrials(False, local.q if met and number else None, spent)
+            return ReachTrials(False, local.q if met and number else None, near, spent)
         if local.violation.hold > SEARCH.held * local.violation.left:
             continue  # from there the constraints alone are too far
         ends.append(local)
-        most = SEARCH.agree * min(nearest, *(end.violation.total for end in ends)) + tolerance
+        near = local if near is None or local.violation.total < near.violation.total else near
+        most = SEARCH.agree * near.violation.total + tolerance
         if sum(end.violation.total <= most for end in ends) == agreeing:
-            return ReachTrials(True, None, spent)
-    return ReachTrials(False, None, spent)
+            return ReachTrials(True, None, near, spent)
+    return ReachTrials(False, None, near, spent)
 
 
 def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:

@@ -49,8 +49,8 @@ class Multistart:
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
-        # Through things: least violation of a relaxed probe, so near come the goals, and measures where they are met.
-        self._nearest_through, self._through_measure = np.inf, 0.0
+        self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
+        self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self.out_of_reach = False  # as it seems
         self._best: LocalSolution | None = None
 
@@ -147,7 +147,7 @@ class Multistart:
         self.spent += found.spent
         self.tried += found.tried
         self.trace += found.trace
-        self.out_of_reach = found.out_of_reach
+        self.out_of_reach, self._near = found.out_of_reach, found._near
         if found.best is begin and begin.violation.worst > self.settings.tolerance:
             return None
         return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
@@ -182,7 +182,6 @@ class Multistart:
         """Feasibility with pairs relaxed by a depth, then with the true clearances; None where out of reach."""
         most, relaxed = self._at_most(SEARCH.probe_programs), self.lineariser.relaxed(SEARCH.start_depth)
         through = self._ran(self._feasibility(relaxed, most, note), start)
-        self._nearest_through = min(self._nearest_through, through.violation.total)
         if through.violation.worst > SEARCH.reached * self.settings.tolerance:
             return None
         return self._ran(self._feasibility(self.lineariser, most, note), through.q)
@@ -198,7 +197,6 @@ class Multistart:
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         relaxed = self._probe(start, SEARCH.relaxation_depth)
-        self._nearest_through = min(self._nearest_through, relaxed.violation.total)
         if relaxed.violation.worst > SEARCH.reached * self.settings.tolerance:
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
@@ -296,6 +294,8 @@ class Multistart:
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""
         self.spent += (local := stage.run(start)).iterations
+        if self._near is None or local.violation.total < self._near.violation.total:
+            self._near = local
         return local
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
@@ -316,9 +316,9 @@ class Multistart:
             self._accept(self._stay(self.best), self.how)
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
-        if self.best.violation.left <= tolerance:
-            return
-        if self.problem.measures and self.settings.measures:
+        if self._near is not None and SEARCH.agree * self._near.violation.total < self.best.violation.total:
+            self._accept(self._ran(self._closest(), self._probe(self._near.q, 0.0).q), self.how)
+        if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
                 self._best = local
@@ -339,9 +339,9 @@ class Multistart:
         enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
-        found = reach_trials(reach, starts, self._nearest_through, agreeing, self.settings.tolerance)
+        found = reach_trials(reach, starts, self._near, agreeing, self.settings.tolerance)
         self.spent += found.spent
-        self._through = [] if found.reached is None else [found.reached]
+        self._through, self._near = ([] if found.reached is None else [found.reached]), found.nearest
         return found.out_of_reach
 
     def _closest_from_best(self) -> None:
