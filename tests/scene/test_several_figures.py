@@ -339,6 +339,9 @@ def test_one_of_several_is_named_where_one_is_meant(pair: wb.Scene) -> None:
     assert wb.ergonomics.sight(pair, figure.neutral, beyond, eyes="anna/gaze").hidden_by.startswith("ben/")
     with pytest.raises(InputError, match="has no frame 'gaze'"):
         wb.ergonomics.sight(pair, figure.neutral, beyond)
+    for stands in (wb.Balance(), wb.Stand("floor")):
+        with pytest.raises(InputError, match=r"name the feet of one, feet=\['anna/left_foot', 'anna/right_foot'\], or"):
+            wb.Problem(pair, constraints=[stands])
     with pytest.raises(InputError, match="figure 'both' is several figures"):
         wb.Assembly().figure("both", figure)
     assert handle_frames(figure.frames)[:2] == ["anna/left_palm", "anna/right_palm"]

@@ -70,7 +70,13 @@ def run(arguments: argparse.Namespace) -> int:
         from wholebody.ergonomics.work import Work
         from wholebody.motion.strength import Strength
 
-        check_person(task.problem.scene.figure, "--ergonomics")
+        figure = task.problem.scene.figure
+        if figure.root == "several":
+            raise InputError(
+                f"--ergonomics scores one person, not {' and '.join(figure.members)}; in Python, wb.ergonomics."
+                "ergonomics_of(figure.members[name].figure, figure.part(name, q)) scores each"
+            )
+        check_person(figure, "--ergonomics")
         strength = Strength(**{name: given.pop(name) for name in ("percentile", "sex") if name in given})
         if "seated" in given:
             given["seated"] = given["seated"] == "yes"

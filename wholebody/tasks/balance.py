@@ -56,7 +56,7 @@ def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array
 
 def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
     """The same, and the joints (n,) that carry them."""
-    joints = tuple([inputs.find_place(scene, foot, "Balance").joint for foot in feet])
+    joints = tuple([place.joint for place in inputs.find_feet(scene, feet, "Balance")])
     soles = inputs.once(scene, ("soles", joints), partial(_soles_of, scene, feet, joints))
     with scene.figure.posed(q) as state:
         points = np.einsum("nj,njk->nk", soles.points, state.joints[soles.joints])

@@ -48,6 +48,16 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
         raise UnknownNameError(error.kind, error.name, error.known, where) from None
 
 
+def find_feet(scene: Surroundings, feet: Sequence[str], where: str) -> list[Place]:
+    """Look up the segments that a figure stands on; those of one figure among several have its name too."""
+    exists = scene.model.existFrame
+    owners = [body for body in scene.figure.bodies if body and all(exists(f"{body}{foot}") for foot in feet)]
+    if owners and not any(map(exists, feet)):
+        named = ", or ".join(str([f"{body}{foot}" for foot in feet]) for body in owners)
+        raise InputError(f"{where}: the scene has several figures; name the feet of one, feet={named}")
+    return [find_place(scene, foot, where) for foot in feet]
+
+
 def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:
     """Look up the reference frame of another frame; None is the world."""
     if name is None:

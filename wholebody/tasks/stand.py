@@ -67,8 +67,7 @@ class Stand(TermOfParts):
         if stray := [str(knee) for knee in self.knees if knee not in self.feet]:
             example = "feet=['left_foot', 'right_shank'], knees=['right_shank']"
             raise InputError(f"{where}: knees are of the feet, and {some(stray)} is not; give {example}")
-        for foot in self.feet:
-            inputs.find_place(scene, foot, where)
+        inputs.find_feet(scene, self.feet, where)
         key = type(self), self.on, tuple(self.feet), tuple(self.knees), self.balance
         parts, touches = once_by(scene, [self.on], where, start, key, partial(self._between, scene, where))
         keeps, soles = 0.0, parts[-1]

@@ -72,3 +72,16 @@ def test_where_goals_conflict_their_weights_decide(scene: wb.Scene) -> None:
     for weights, own in left.items():
         cost = {other: float(np.array(weights) @ found**2) for other, found in left.items()}
         assert cost[weights] <= 1.001 * min(cost.values()), (weights, own, cost)
+
+
+def test_a_descent_that_has_spent_its_programs_goes_on() -> None:
+    """Soft goals that contradict each other are nearly as well met by descents of few programs as by long ones."""
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    places = {"right_palm": (0.9, -0.6, 1.9), "left_palm": (0.5, 0.5, 0.2)}
+    soft = [wb.Soft(wb.Point(palm, place, weight=30.0)) for palm, place in places.items()]
+    soft.append(wb.Soft(wb.Relative("left_palm", "right_palm", (0.0, 0.0, 0.3), weight=30.0)))
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    problem = wb.Problem(scene, "standing", constraints=feet, measures=[wb.Effort(), *soft])
+    few, many = (wb.solve(problem, wb.methods.QP(iterations=most)).assessment for most in (10, 150))
+    assert few.measure < 1.01 * many.measure
+    assert few.holds(1e-5)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain, islice
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,7 +17,7 @@ from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
 from wholebody.methods.qp.feasibility import Feasibility
-from wholebody.methods.qp.iterates import LocalSolution, Run, better, held, moving
+from wholebody.methods.qp.iterates import Attempt, LocalSolution, Run, better, held, moving
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
@@ -29,14 +28,6 @@ from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import Effort
 from wholebody.terms.linearisation import Lineariser
-
-
-class Attempt(NamedTuple):
-    """A part of a search."""
-
-    starts: Iterable[Array]  # (nq,) postures to begin at
-    stage: Callable[[Array], LocalSolution | None]  # where it leads from one; None where that is given up
-    how: str  # what the message says of an answer that it found
 
 
 class Multistart:
@@ -87,6 +78,7 @@ class Multistart:
         if other is not None:
             self._accept(self.directly(other), "directly")
         self._find_closest()
+        self._go_on()
         self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
@@ -237,6 +229,13 @@ class Multistart:
         if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
             self._accept(self._descend(local.q), self.how)
         return self.best.measure < SEARCH.moved * before
+
+    def _go_on(self) -> None:
+        """Descend on where a descent had spent its programs while the measures still decreased."""
+        gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
+        while gains and not self.best.converged and self._left > 0 and not self.control.over:
+            before = self.best.measure
+            gains = self._accept(self._descend(self.best.q), self.how) and self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
