@@ -112,6 +112,7 @@ def test_those_refused_are_in_no_share() -> None:
     assert found.share == pytest.approx(2 / 3)
     assert (found.by_sex["male"].tried, [*found.by_sex]) == (3, ["male"])
     assert [(one.verdict, one.excluded) for one in found.exclusions] == [("fit", 1)]
+    assert "by chance" in str(found.exclusions[0])  # 37 dimensions, one of which orders one man and another
     assert "Accommodation of 3 people, 2 more refused: 67%" in repr(found)
 
 
