@@ -70,11 +70,12 @@ def unchanged(scene: wb.Scene, look: Callable[[], None]) -> None:
 def test_a_scene_of_all_shapes(scene: wb.Scene, tmp_path: Path) -> None:
     q = scene.figure.neutral
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.1, 0.0, 0.1))])
-    scene.contacts(q, 0.5)  # what coal caches at its first query is there already
+    distance = scene.contacts(q, 0.5).distance  # what coal caches at its first query is there already
     unchanged(scene, lambda: every_look(scene, q, tmp_path, problem))
     world = ViewedWorld(scene, ["box", "torus"])
     places = {name: scene.objects[name].placement for name in ("box", "torus")}
     unchanged(scene, lambda: every_look(world, world.configuration(q, places), tmp_path))
+    assert np.array_equal(scene.contacts(q, 0.5).distance, distance)
 
 
 def test_an_assembly(tmp_path: Path) -> None:

@@ -316,8 +316,9 @@ class Multistart:
             self._accept(self._stay(self.best), self.how)
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
-        if self._near is not None and SEARCH.agree * self._near.violation.total < self.best.violation.total:
-            self._accept(self._ran(self._closest(), self._probe(self._near.q, 0.0).q), self.how)
+        near, missed = self._near, self.best.violation
+        if near is not None and missed.worst > tolerance and SEARCH.agree * near.violation.total < missed.total:
+            self._accept(self._ran(self._closest(), self._probe(near.q, 0.0).q), self.how)
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
