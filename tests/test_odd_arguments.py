@@ -487,7 +487,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         Call(wb.methods.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used),
     )
     yield "CCD.solve", Call(wb.methods.CCD().solve, {"problem": ask, "progress": print})
-    yield "CCD.pushed_out", Call(wb.methods.CCD().pushed_out, {"problem": ask, "q": q})
     newton = {"algebra": "auto", "inequalities": "slack", "restarts": 1, "seed": 0, "time_limit": 1.0}
     yield "Newton", Call(wb.methods.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
     yield "Newton.solve", Call(wb.methods.Newton().solve, {"problem": ask, "progress": print})

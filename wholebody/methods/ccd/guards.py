@@ -14,8 +14,8 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, rotated, three
-from wholebody.methods.ccd.ranges import RangeGuard, range_guards
+from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, three
+from wholebody.methods.ccd.ranges import LimbGuard, RangeGuard, range_guards
 from wholebody.methods.ccd.sweep import Aims
 
 
@@ -57,8 +57,8 @@ class Polygon:
         return three(found / np.linalg.norm(found))
 
 
-class ConeGuard:
-    """Keeps one limb in its cone while the nodes of some limbs move; `nodes` are those that turn it there.
+class ConeGuard(LimbGuard):
+    """Keeps one limb in its cone while the nodes of some limbs move.
 
     A limb that has left its cone is projected to the nearest direction inside (Wilhelms and Van Gelder 2001): the
     joints of the ball joint turn, each to its best, until the limb points there.
@@ -66,18 +66,12 @@ class ConeGuard:
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
         cone = figure.cones[name]
-        self._polygon, self._axis, self._limbs = Polygon(cone.cone), np.asarray(cone.axis, dtype=float), limbs
-        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (cone.limb, cone.reference))
-        self.nodes = limbs.between(self._base.node, self._limb.node)
+        super().__init__(figure, limbs, cone.limb, cone.reference)
+        self._polygon, self._axis = Polygon(cone.cone), np.asarray(cone.axis, dtype=float)
 
     def holds(self, data: Any) -> bool:
         """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
         return self._polygon.contains(three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
-
-    def read(self, q: Array, data: Any) -> None:
-        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
-        self._limb.read(data)
-        self._base.read(data)
 
     def inside(self) -> bool:
         """Whether the limb is in its cone, after `limbs.forward`."""

@@ -120,17 +120,6 @@ class CCD(Checked, Descends):
         """
         return CCDTracker(self, problem, dt)
 
-    def pushed_out(self, problem: Problem, q: Array) -> Array:
-        """The result of overlap resolution at the posture q (nq,), without regard to the goals; it may still overlap.
-
-        Raises:
-            UnsupportedTermError: the problem has terms that this method cannot take.
-        """
-        check_problem(problem, "CCD.pushed_out: problem")
-        q = posture(q, problem.scene.model.nq)
-        with problem.borrow() as workspace:
-            return _Search(self, problem, _Shared(problem.scene, workspace), Control(np.inf)).pushed_out(q)
-
 
 class CCDTracker(DescentTracker[CCD]):
     """Follows by searches; it resolves overlap with things that were moved into the figure."""

@@ -59,16 +59,25 @@ class _Sum:
             excess -= gone
 
 
-class CoupledGuard:
-    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
+class _SumsGuard:
+    """Keeps sums of joint angles; `nodes` are those that change them."""
 
-    def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
-        self._sum, self._bound, self._limbs = _Sum(figure, limbs, dict(part.joints)), part.bound, limbs
-        self.nodes = self._sum.nodes
+    def __init__(self, limbs: Limbs, sums: Sequence[_Sum]) -> None:
+        self._limbs, self._sums = limbs, sums
+        self.nodes = tuple(node for angle in sums for node in angle.nodes)
 
     def read(self, q: Array, data: Any) -> None:
         """Read what the limbs do not move at the posture q (nq,)."""
-        self._sum.read(q)
+        for angle in self._sums:
+            angle.read(q)
+
+
+class CoupledGuard(_SumsGuard):
+    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
+        self._sum, self._bound = _Sum(figure, limbs, dict(part.joints)), part.bound
+        super().__init__(limbs, [self._sum])
 
     def inside(self) -> bool:
         """Whether the sum is within its bound."""
@@ -80,18 +89,12 @@ class CoupledGuard:
         self._limbs.forward()
 
 
-class EllipticGuard:
+class EllipticGuard(_SumsGuard):
     """Keeps angles on or in an ellipse; see `EllipticRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: EllipticRange) -> None:
-        self._axes = [(_Sum(figure, limbs, dict.fromkeys(axis.joints, 1.0)), axis) for axis in part.axes]
-        self._limbs = limbs
-        self.nodes = tuple(node for angle, _ in self._axes for node in angle.nodes)
-
-    def read(self, q: Array, data: Any) -> None:
-        """Read what the limbs do not move at the posture q (nq,)."""
-        for angle, _ in self._axes:
-            angle.read(q)
+        super().__init__(limbs, [_Sum(figure, limbs, dict.fromkeys(axis.joints, 1.0)) for axis in part.axes])
+        self._axes = list(zip(self._sums, part.axes, strict=True))
 
     def inside(self) -> bool:
         """Whether the angles are in the ellipse."""
@@ -113,20 +116,28 @@ class EllipticGuard:
         return sum(share * share for share in shares)
 
 
-class TwistGuard:
-    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
+class LimbGuard:
+    """Keeps the direction or the turn of a limb in a reference frame; `nodes` are those that turn it there."""
 
-    def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
-        self._part, self._limbs = part, limbs
-        self._center = floats(pin.SE3(part.center, np.zeros(3)))
-        self._slope: list[float] = (part.slope @ part.center).tolist()
-        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (part.limb, part.reference))
+    def __init__(self, figure: Figure, limbs: Limbs, limb: str, reference: str) -> None:
+        self._limbs = limbs
+        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (limb, reference))
         self.nodes = limbs.between(self._base.node, self._limb.node)
 
     def read(self, q: Array, data: Any) -> None:
         """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
         self._limb.read(data)
         self._base.read(data)
+
+
+class TwistGuard(LimbGuard):
+    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
+        super().__init__(figure, limbs, part.limb, part.reference)
+        self._part = part
+        self._center = floats(pin.SE3(part.center, np.zeros(3)))
+        self._slope: list[float] = (part.slope @ part.center).tolist()
 
     def inside(self) -> bool:
         """Whether the twist is within its bound, after `limbs.forward`."""
