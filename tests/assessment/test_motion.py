@@ -14,7 +14,6 @@ from wholebody.assessment import motion as motion_assessment
 from wholebody.assessment.motion import (
     assess_motion,
     deepened,
-    depth_between,
     frames_passed_through,
     pairs_along,
     velocities,
@@ -57,10 +56,6 @@ def test_a_way_through_a_plate_is_seen_though_both_ends_are_free(beside_a_plate:
     assert judged.overlapping.max() == 0
     assert frames_passed_through(beside_a_plate, motion, 1e-3) == (1,)
     assert deepened(beside_a_plate, motion).tolist() == [np.inf, motion_assessment.DEPTHS[0]]
-    depth, what = depth_between(beside_a_plate, before, after, 1e-3)
-    assert depth > 0.01
-    assert "plate" in what
-    assert depth_between(beside_a_plate, after, after, 1e-3) == (0.0, "")
 
 
 def test_a_joint_without_limits_has_jerk() -> None:

@@ -31,10 +31,10 @@ from wholebody.bench.tables import render
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.linear_algebra import LinearSystem, Pattern, linear_algebra
+from wholebody.methods.newton.method import NewtonTracker
 from wholebody.methods.newton.settings import STEPS
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.terms import FigureSystem
-from wholebody.methods.newton.tracking import NewtonTracker
 
 SIZES = (10, 30, 100, 300, 1000)
 SMALLEST_FITTED = 30  # bodies: smaller systems cost what any call costs

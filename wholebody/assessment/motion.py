@@ -27,7 +27,6 @@ from wholebody.tasks import ReachCones
 Counts = NDArray[np.intp]
 
 OVERLAPS = 1e-5  # m: a pair overlaps if it is deeper than this
-PARTS = 41  # postures of a motion at which its depth is measured
 
 DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 """Depths, metres, that are tried in turn as a bound on the depth of a motion between two postures."""
@@ -134,15 +133,3 @@ def deepened(scene: Scene, q: Array) -> Array:
         )
         found.append(next(free, np.inf))
     return np.array(found)
-
-
-def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
-    """Depth [m] of the motion between two postures (nq,), if more than `depth`, and the names of the pair."""
-    contact = scene.sweep(before, after, depth)
-    if contact is None or not contact.certain:
-        return 0.0, ""
-    deepest = depth
-    for share in np.linspace(0.0, 1.0, PARTS):
-        found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, after, float(share))), within=0.0)
-        deepest = max(deepest, float(-found.distance.min(initial=0.0)))
-    return deepest, " and ".join(scene.piece_owner[piece] for piece in contact.pair)

@@ -13,8 +13,8 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton import quaternions as quat
+from wholebody.methods.newton.assembly_joints import OnSurface
 from wholebody.methods.newton.linear_algebra import Gram
-from wholebody.methods.newton.task_batches import OnSurface
 
 H = 1e-6
 

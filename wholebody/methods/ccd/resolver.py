@@ -13,10 +13,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Tracked
+from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Link, LinkFinder, Overlap, Tracked
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
-from wholebody.methods.ccd.links import Link, LinkFinder, Overlap
 from wholebody.methods.control import Control
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace

@@ -136,11 +136,9 @@ class FigureBodies:
         self._axes = np.zeros((2, model.nv, 3))  # translation, rotation
         for joint in range(1, model.njoints):
             kind = model.joints[joint]
-            place, data = slice(kind.idx_v, kind.idx_v + kind.nv), kind.createData()
-            kind.calc(data, pin.neutral(model)[kind.idx_q : kind.idx_q + kind.nq])
+            place = slice(kind.idx_v, kind.idx_v + kind.nv)
             self._ends[0, place], self._ends[1, place] = self.index(joint), self.index(int(model.parents[joint]))
-            subspace = np.array(data.S).reshape(6, -1)
-            self._axes[:, place] = subspace.reshape(2, 3, -1).transpose(0, 2, 1)
+            self._axes[:, place] = np.array(kind.createData().S).reshape(2, 3, -1).transpose(0, 2, 1)
         columns = (7 * (self._ends.T[:, :, None] - self.first) + np.arange(7)).reshape(model.nv, 14)
         sliding = self._axes[0].any(axis=1)[:, None]
         self._reads: Mask = (columns >= 0) & (sliding | (np.arange(14) % 7 >= 3))  # nothing of the world
@@ -277,16 +275,9 @@ class FigureBodies:
 
 
 def _axis(kind: Any) -> Array:
-    name = kind.shortname()
-    if name.endswith("Unaligned"):
-        known = getattr(kind.extract(), "axis", None)
-        if known is not None:
-            return np.array(known)
-        data = kind.createData()  # Pinocchio gives the axis of unbounded joints only as their motion
-        kind.calc(data, np.array([1.0, 0.0]))
-        return np.array(data.S).ravel()[3:]
-    result: Array = np.eye(3)["XYZ".index(name[-1])]
-    return result
+    """Unit axis (3,) of a joint that slides along one or turns about one."""
+    slide, turn = np.array(kind.createData().S).reshape(2, 3)
+    return slide if slide.any() else turn
 
 
 def _unit(body: Array) -> Array:

@@ -19,20 +19,20 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import UndefinedTermError
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.acceleration import Anderson
-from wholebody.methods.newton.batches import OBJECTIVE, Angle, Batch
+from wholebody.methods.newton.batches import OBJECTIVE, PLACE, TURN, Angle, Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
 from wholebody.methods.newton.own_rows import TangentRows, quadratic_model, square_rows
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, System
-from wholebody.methods.newton.task_batches import RootMotion
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
@@ -40,6 +40,41 @@ from wholebody.tasks.checks import defined
 
 MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
 """Measures that are minimised over the revolute joints, and over a root that they count."""
+
+
+class RootMotion(Batch):
+    """Displacement of a free root from a posture, in its own axes there, less a target; linear in the body.
+
+    Three rows are R_a' (r - r_a), three are 2 vec(conj(e_a) e). At r = r_a and e = e_a their derivative is that of
+    Pinocchio's tangent displacement.
+    """
+
+    size = 6
+    pattern = np.zeros((6, 7), dtype=bool)
+    pattern[:3, PLACE] = pattern[3:, TURN] = True
+
+    def __init__(self, body: int, label: str) -> None:
+        """Take the number of the root's body; `anchor` says from where it moves."""
+        super().__init__(np.array([[body]]), [label])
+        self._place, self._target, self._slope = np.zeros(3), np.zeros(6), np.zeros((6, 7))
+
+    def anchor(self, root: Array, target: Array) -> None:
+        """Count from the root's placement (7,), position and quaternion x, y, z, w, towards a displacement (6,)."""
+        a, b, c, w = root[3:].tolist()
+        self._place, self._target = root[:3].copy(), target
+        self._slope[:3, PLACE] = pin.Quaternion(root[3:]).toRotationMatrix().T
+        self._slope[3:, TURN] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        body = x[self.bodies[0, 0]]
+        turned = self._slope[3:, TURN] @ body[TURN]
+        moved = self._slope[:3, PLACE] @ (body[PLACE] - self._place)
+        result: Array = np.concatenate([moved, turned])[None] - self._target
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        result: Array = self._slope[None].copy()
+        return result
 
 
 class Objective:

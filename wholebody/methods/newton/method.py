@@ -1,19 +1,32 @@
-"""The Newton method on whole problems: full coordinates, sparse factorisation, least motion."""
+"""The Newton method on whole problems: full coordinates, sparse factorisation, least motion.
+
+Its tracker keeps the equations and their analysis from frame to frame.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from wholebody.methods.base import UnsupportedTermError, check_problem
-from wholebody.methods.conclusion import Ending
-from wholebody.methods.control import Control
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import posture
+from wholebody.base.pool import OneAtATime
+from wholebody.geometry.continuous.passing_through import SHORT
+from wholebody.methods.base import TOLERANCE, SolvingTracker, UnsupportedTermError, check_problem
+from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.descents import Descends
+from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
-from wholebody.methods.newton.settings import STARTS
+from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
-from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.problem import Problem
+from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import Workspace
+from wholebody.solution import Solution
+from wholebody.tasks import StepLimit
 
 
 @dataclass(frozen=True)
@@ -82,3 +95,124 @@ class Newton(Settings, Descends):
                 number, or the scene changed after the problem was made.
         """
         return NewtonTracker(self, problem, dt)
+
+
+class NewtonStep(NamedTuple):
+    """Answer of one frame: posture (nq,), iterations, linear systems, patterns so far, and collisions."""
+
+    q: Array
+    iterations: int
+    systems: int
+    structures: int
+    collisions: tuple[Collision, ...] = ()
+
+
+class NewtonTracker(SolvingTracker):
+    """Follows the goals of one problem, frame by frame.
+
+    Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker
+    remembers the previous frame, so it serves one motion and one thread at a time.
+
+    Attributes:
+        unswept: radians and metres: shorter motions need no sweep, because every iteration of a frame was tested.
+        leaves_overlap: True.
+    """
+
+    unswept = SHORT
+    leaves_overlap = True
+
+    def __init__(self, method: Any, problem: Problem, dt: float | None) -> None:
+        """Build the equations for a method that is its `Settings`. Where dt is None, speeds are not bounded."""
+        super().__init__(method, problem, 1.0 if dt is None else dt)
+        self._settings: Settings = method
+        self._bounded = dt is not None
+        self._alone = OneAtATime("tracker")
+        self._lay_out()
+
+    def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
+        """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
+
+        Weights count where goals conflict. So all goals are first followed alike; the frame is made again with their
+        weights if that reduced light goals at the expense of heavy ones.
+
+        Raises:
+            InputError: objects were added to or removed from the scene, a new term has no equations, or another thread
+                is within a call of this tracker.
+        """
+        q = posture(q, self.workspace.model.nq)
+        enough = FRAMES.tolerance if tolerance is None else TOLERANCE(tolerance, "tolerance")
+        with self._alone:
+            active_system = self._renewed()
+            active_system.objective.anchor(q)
+            if self._bounded and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
+                state = self.workspace.state.update(q)
+                ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
+                active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
+            found, spent = None, 0
+            if len({goal.weight for goal in self.problem.goals}) > 1:
+                found = self._satisfied(active_system, q, enough, even=True)
+                spent = found.iterations
+            if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
+                found = self._satisfied(active_system, q, enough, even=False)
+                spent += found.iterations
+            # where the time of a frame was not enough to restore the constraints, the next goes on from here
+            cut = BUDGET.over and not found.hard <= FRAMES.tolerance
+            end = q if cut else active_system.posture(found.x)
+            return NewtonStep(end, spent, found.systems, active_system.structures)
+
+    def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
+        """The end of the iteration from the posture q (nq,); goals count alike if `even`."""
+        active_system.even = even
+        try:
+            return satisfy(
+                active_system,
+                active_system.variables(q),
+                tolerance=STARTS.sharper * self._settings.tolerance,
+                goal_tolerance=enough,
+                iterations=FRAMES.iterations,
+                kind=self._settings.inequalities,
+                early_exit=True,
+            )
+        finally:
+            active_system.even = False
+
+    def _trades(self, before: Array, after: Array) -> bool:
+        """Whether goals of small weight improved at the expense of goals of large weight between two postures (nq,)."""
+        # True if the weighted error fell relatively by less than half as much as the unweighted error, or neither fell:
+        # goals that pull alike against each other do not move.
+        goals = self.problem.goals
+        weights = np.sqrt([goal.weight for goal in goals])
+        errors = []
+        for q in (before, after):
+            state = self.workspace.state.update(q)
+            errors.append(np.array([np.linalg.norm(goal.error(state)) for goal in goals]))
+        even, weighted = (np.linalg.norm(by * errors[1]) / np.linalg.norm(by * errors[0]) for by in (1.0, weights))
+        return bool(1.0 - weighted <= 0.5 * (1.0 - even) + 1e-6)
+
+    def solve(self, q: Array) -> Solution:
+        """Solve for the problem's present goals from the posture q (nq,), without other starts."""
+        q = posture(q, self.workspace.model.nq)
+        with self._alone:
+            search = Search(self._renewed(), self._settings)
+            search.active_system.control = control = Control(np.inf)
+            ending = search.ending(search.from_here(q))
+        tolerance = self._settings.tolerance
+        return concluded(self.problem, ending, method=self._method.name, tolerance=tolerance, control=control)
+
+    def _lay_out(self) -> None:
+        problem = self.problem
+        self._active_system = FigureSystem(problem, self.workspace, self._settings.algebra)
+        self._terms = (problem.constraints, problem.bounds, problem.measures)
+
+    def _renewed(self) -> FigureSystem:
+        """The equations of the problem with its present goals; built anew if other terms were replaced."""
+        problem = self.problem
+        problem.check_fresh()
+        self.workspace.refresh()
+        now = (problem.constraints, problem.bounds, problem.measures)
+        if any(new is not old for new, old in zip(now, self._terms, strict=True)):
+            self._lay_out()
+        self._active_system.retarget()
+        self._active_system.objective.follow()
+        self._active_system.bodies.free_step()
+        return self._active_system

@@ -129,20 +129,20 @@ def add_terms(solver: Any, robot: Robot, problem: Problem, holding: float) -> Ta
 
 
 def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> None:
+    if isinstance(goal, Posture):
+        _posture(solver, robot, problem, name, goal)
+        return
+    if isinstance(goal, (Frame, Orientation, Relative)):
+        _placement(solver, name, goal.residual, "soft", goal.weight)
+        return
     if isinstance(goal, Point):
         task = solver.add_position_task(_name(goal.place, goal.resolved_offset), np.array(goal.resolved_target))
-        task.configure(name, "soft", goal.weight)
-    elif isinstance(goal, (Frame, Orientation, Relative)):
-        _placement(solver, name, goal.residual, "soft", goal.weight)
     elif isinstance(goal, Axis):
         task = solver.add_axisalign_task(_name(goal.place), np.array(goal.basis[2]), np.array(goal.resolved_target))
-        task.configure(name, "soft", goal.weight)
-    elif isinstance(goal, CenterOfMass):
+    else:
         task = solver.add_com_task(np.array((*goal.resolved_target, 0.0)[:3]))
         task.mask.set_axises(goal.axes, "task")
-        task.configure(name, "soft", goal.weight)
-    elif isinstance(goal, Posture):
-        _posture(solver, robot, problem, name, goal)
+    task.configure(name, "soft", goal.weight)
 
 
 def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Posture) -> None:
@@ -178,19 +178,18 @@ def _constraint(solver: Any, name: str, term: Any, holding: float) -> None:
 
 def _placement(solver: Any, name: str, residual: PlacementResidual, priority: str, weight: float) -> None:
     """The residual of one frame in another, or in the world."""
-    frame, target = _name(residual.place), residual.placement
+    target, names = residual.placement, [_name(residual.place)]
     if residual.base.frame:
-        arguments: tuple[Any, ...] = (_name(residual.base), frame)
-        kind = "relative_"
-    else:
-        arguments, kind = (frame,), ""
+        names.insert(0, _name(residual.base))
+    weights = [weight]
     if residual.position and residual.orientation:
-        task = getattr(solver, f"add_{kind}frame_task")(*arguments, target.homogeneous)
-        task.configure(name, priority, weight, weight)
+        kind, wanted, weights = "frame", target.homogeneous, [weight, weight]
     elif residual.position:
-        getattr(solver, f"add_{kind}position_task")(*arguments, target.translation).configure(name, priority, weight)
+        kind, wanted = "position", target.translation
     else:
-        getattr(solver, f"add_{kind}orientation_task")(*arguments, target.rotation).configure(name, priority, weight)
+        kind, wanted = "orientation", target.rotation
+    relative = "relative_" if residual.base.frame else ""
+    getattr(solver, f"add_{relative}{kind}_task")(*names, wanted).configure(name, priority, *weights)
 
 
 def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:

@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability import asking
-from wholebody.bench.suite.stability.asking import Judged, ask, judge, run
+from wholebody.bench.suite.stability.asking import Judged, ask, depth_between, judge, run
 from wholebody.bench.suite.stability.catalogue import NOTHING, Answer, Stream, cases
 from wholebody.bench.suite.stability.verdict import Verdict, decide, length, result
 from wholebody.problem import Problem
@@ -206,3 +207,12 @@ def test_a_stream_that_says_less_is_left_than_is() -> None:
 )
 def test_lengths(metres: float, words: str) -> None:
     assert length(metres) == words
+
+
+def test_a_way_through_a_plate_is_as_deep_as_the_plate(planar_arm: Callable[..., wb.Figure]) -> None:
+    scene = wb.Scene(planar_arm((0.4, 0.3))).add(wb.Box((0.6, 0.01, 0.2)), name="plate", at=(0.5, 0.0, 0.0))
+    before, after = np.array([0.6, 0.0]), np.array([-0.6, 0.0])
+    depth, what = depth_between(scene, before, after, 1e-3)
+    assert depth > 0.01
+    assert "plate" in what
+    assert depth_between(scene, after, after, 1e-3) == (0.0, "")

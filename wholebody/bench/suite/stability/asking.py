@@ -8,19 +8,23 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import pinocchio as pin
 
-from wholebody.assessment.motion import depth_between, velocities
+from wholebody.assessment.motion import velocities
 from wholebody.assessment.posture import Assessment, assess
+from wholebody.base.arrays import Array
 from wholebody.base.compiled import compile_all
 from wholebody.base.errors import WholebodyError
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.catalogue import NOTHING, Answer, HardCase, Nonsense, Posed, Stream, cases
 from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Point
 from wholebody.tracking.drag import Drag
 
 INSIDE = 1e-4  # m: deeper than this is inside
+PARTS = 41  # postures of a motion at which its depth is measured
 
 
 @dataclass(frozen=True)
@@ -218,3 +222,15 @@ def _nonsense(question: Nonsense, adapter: Adapter) -> Answer:
 def _named(error: Exception) -> str:
     lines = str(error).strip().splitlines()
     return f"{type(error).__name__}: {lines[0] if lines else ''}"[:160]
+
+
+def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
+    """Depth [m] of the motion between two postures (nq,), if more than `depth`, and the names of the pair."""
+    contact = scene.sweep(before, after, depth)
+    if contact is None or not contact.certain:
+        return 0.0, ""
+    deepest = depth
+    for share in np.linspace(0.0, 1.0, PARTS):
+        found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, after, float(share))), within=0.0)
+        deepest = max(deepest, float(-found.distance.min(initial=0.0)))
+    return deepest, " and ".join(scene.piece_owner[piece] for piece in contact.pair)
