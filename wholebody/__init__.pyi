@@ -35,7 +35,7 @@ from wholebody.geometry.shapes import (
 )
 from wholebody.methods.base import Method as Method, Tracker as Tracker
 from wholebody.methods.newton.assembly import Assembly as Assembly
-from wholebody.methods.simplification.simplify import simplify as simplify
+from wholebody.methods.simplification import simplify as simplify
 from wholebody.methods.solve import solve as solve
 from wholebody.motion.avoidance import avoid as avoid
 from wholebody.motion.checking import check as check

@@ -12,7 +12,7 @@ from wholebody.base.errors import WholebodyError
 from wholebody.bench.measure.scaling import TIP, chain, task
 from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.methods.simplification.simplify import simplify
+from wholebody.methods.simplification import simplify
 from wholebody.problem import Problem
 
 SHOWN = "solved", "pairs", "a solve ms", "judgement ms", "inside", "worst deepest mm", "worst effort above %"

@@ -24,7 +24,7 @@ from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.conclusion import meets
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.methods.qp.method import QP
-from wholebody.methods.simplification.reach import still_dofs
+from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect

@@ -8,7 +8,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
-from wholebody.methods.simplification.reach import still_dofs
+from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
 
 ROOM = 1.0  # m: by which samples move a free root along each axis

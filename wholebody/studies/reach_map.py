@@ -19,7 +19,7 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method, check_problem
 from wholebody.methods.contradictions import contradictions
 from wholebody.methods.qp.method import QP
-from wholebody.methods.simplification.reach import beyond_reach
+from wholebody.methods.simplification import beyond_reach
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap

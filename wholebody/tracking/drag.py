@@ -16,7 +16,7 @@ from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, Step, Tracker, goal_error, judged
 from wholebody.methods.control import BUDGET, budget_for_sweep, within_budget
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.newton.assembly_solution import AssemblySolution
+from wholebody.methods.newton.assembly_system import AssemblySolution
 from wholebody.methods.newton.settings import FRAMES
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem

@@ -16,7 +16,7 @@ from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_text
 from wholebody.methods.base import Method, check_problem
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.newton.assembly_solution import AssemblySolution
+from wholebody.methods.newton.assembly_system import AssemblySolution
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.clip import MOST_FRAMES
 from wholebody.problem import Problem

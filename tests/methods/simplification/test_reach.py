@@ -11,8 +11,7 @@ import pytest
 import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
-from wholebody.methods.simplification.reach import Balls, Reach
-from wholebody.methods.simplification.simplify import simplify
+from wholebody.methods.simplification import Balls, Reach, simplify
 
 POSTURES = 4_000
 

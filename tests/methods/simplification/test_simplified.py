@@ -12,7 +12,7 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
-from wholebody.methods.simplification.simplify import Simplified
+from wholebody.methods.simplification import Simplified
 from wholebody.tasks.base import Measure
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]

@@ -18,7 +18,7 @@ from wholebody.bench.rows import Figure, Panel, Row, measured_ms
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.simplification.simplify import simplify
+from wholebody.methods.simplification import simplify
 from wholebody.tracking.drag import Drag
 
 TIP = "tip"

@@ -19,15 +19,17 @@ from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.base import ITERATIONS, TOLERANCE
 from wholebody.methods.control import budget_for_sweep
 from wholebody.methods.newton.assembly_joints import AssemblyJoints
-from wholebody.methods.newton.assembly_solution import (
+from wholebody.methods.newton.assembly_system import (
     AssemblyGoal,
     AssemblySolution,
     AssemblyStep,
+    AssemblySystem,
+    checked,
     explained,
+    objective_of,
     to_target,
 )
-from wholebody.methods.newton.assembly_solution import Kind as GoalKind
-from wholebody.methods.newton.assembly_system import AssemblySystem, checked, objective_of
+from wholebody.methods.newton.assembly_system import Kind as GoalKind
 from wholebody.methods.newton.batches import Batch, EquationSet, Unit
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind

@@ -22,7 +22,7 @@ from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem
-from wholebody.methods.simplification.reach import beyond_reach
+from wholebody.methods.simplification import beyond_reach
 from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.solution import TraceEntry
 from wholebody.tasks.frame import Frame
