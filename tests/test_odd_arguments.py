@@ -716,7 +716,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
-    several = {"most": 2, "apart": 0.2, "method": wb.methods.QP(), "starts": 2, "seed": 0, "time_limit": 1.0}
+    several = {"most": 2, "apart": 0.2, "starts": 2, "seed": 0, "time_limit": 1.0}
     yield "solutions", Call(wb.solutions, {"problem": ask, **several}, str)
     listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False}
     yield "Solutions", Call(Solutions, listed)

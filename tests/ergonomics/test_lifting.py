@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.ergonomics.published import published
+from wholebody.ergonomics.observation import published
 
 INCH, POUND = 0.0254, 0.45359237
 

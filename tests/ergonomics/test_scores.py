@@ -12,7 +12,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.cli.main import main
-from wholebody.ergonomics.published import published
+from wholebody.ergonomics.observation import published
 
 
 @pytest.fixture(scope="module")

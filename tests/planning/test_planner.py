@@ -174,7 +174,7 @@ def test_samples_are_within_limits_and_no_whole_turn_away_where_these_let_them(
     assert np.abs(drawn[:, 0] - at[0]).max() <= np.pi
     assert np.abs(drawn[:, 1] - at[1]).max() <= 2.0 * np.pi  # a limit is near on one side
     assert np.ptp(drawn[:, 0]) > 6.0
-    np.testing.assert_allclose(sampler.turns.nearest(at + [2.0 * np.pi, 0.0], at), at, atol=1e-12)
+    np.testing.assert_allclose(sampler.turned(at + [2.0 * np.pi, 0.0], at), at, atol=1e-12)
 
 
 @pytest.mark.parametrize("goal", [4.0, -5.0])

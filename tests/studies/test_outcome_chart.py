@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import wholebody as wb
-from wholebody.studies.pictures import COLORS, MOST
+from wholebody.studies.records import COLORS, MOST
 
 
 def record(person: str, target: str, outcome: str, error: float = 0.0) -> wb.studies.SolveRecord:

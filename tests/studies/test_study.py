@@ -111,8 +111,7 @@ def test_people_of_a_study_have_proportions_of_their_own(folder: Path) -> None:
 def test_a_study_file_says_of_a_person_what_a_task_file_can_say(folder: Path) -> None:
     person = "percentile = 5\nage = 60\nproportions = { span = 1.6 }"
     (folder / "study.toml").write_text(STUDY.replace("stature = 1.55", person, 1))
-    people = read_study(folder / "study.toml").people
-    assert people is not None
+    people = read_study(folder / "study.toml")["people"]
     assert {"sex": "female", "percentile": 5.0, "age": 60.0, "proportions": {"span": 1.6}} in people.values()
 
 

@@ -56,8 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     make_folder(out)
     with Console(stderr=True).status("solving") as status:
         records = study(
-            asked.task, people=asked.people, targets=asked.targets, layouts=asked.layouts, method=asked.method,
-            warm_start=asked.warm_start, jobs=arguments.at_once, cluster=arguments.cluster, folder=out,
+            **asked, jobs=arguments.at_once, cluster=arguments.cluster, folder=out,
             progress=lambda state: status.update(f"{state.done} of {state.total}"),
         )  # fmt: skip
     made = table("case", "outcome", "goal error", "overlap", "time")

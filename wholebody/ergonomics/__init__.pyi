@@ -9,9 +9,16 @@ from wholebody.ergonomics.exertion import (
 )
 from wholebody.ergonomics.lifting import Lift as Lift, lift_between as lift_between
 from wholebody.ergonomics.vision import Look as Look
-from wholebody.ergonomics.owas_score import Owas as Owas, owas as owas
-from wholebody.ergonomics.reba_score import Reba as Reba, RebaParts as RebaParts, reba as reba
-from wholebody.ergonomics.rula_score import Rula as Rula, RulaParts as RulaParts, rula as rula
+from wholebody.ergonomics.observation import (
+    Owas as Owas,
+    Reba as Reba,
+    RebaParts as RebaParts,
+    Rula as Rula,
+    RulaParts as RulaParts,
+    owas as owas,
+    reba as reba,
+    rula as rula,
+)
 from wholebody.ergonomics.vision import FieldOfView as FieldOfView, Sight as Sight, sight as sight
 from wholebody.ergonomics.work import Work as Work
 from wholebody.tasks.forces import LoadedBalance as LoadedBalance

@@ -9,9 +9,7 @@ from typing import Any
 from wholebody.base.arrays import Array, brief
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
 from wholebody.ergonomics.exertion import StaticTorques, static_torques
-from wholebody.ergonomics.owas_score import Owas, owas_code
-from wholebody.ergonomics.reba_score import Reba, reba_parts
-from wholebody.ergonomics.rula_score import Rula, rula_parts
+from wholebody.ergonomics.observation import Owas, Reba, Rula, owas_of, reba_of, rula_of
 from wholebody.ergonomics.work import Work, seen
 from wholebody.figures.figure import Figure
 from wholebody.motion.strength import Strength
@@ -128,15 +126,9 @@ def ergonomics_of(
         >>> rows = scores.rows()
     """
     person = seen(figure, q, work, "ergonomics_of")
-    angles, work = person.angles, person.work
-    return Ergonomics(
-        angles,
-        Rula(*(rula_parts(angles, side, work) for side in SIDES)),
-        Reba(*(reba_parts(angles, side, work) for side in SIDES)),
-        owas_code(angles, work),
-        static_torques(person.figure, q, load=work.load, seated=work.sits(angles), strength=strength),
-        person.seat,
-    )
+    seated = person.work.sits(person.angles)
+    torques = static_torques(person.figure, q, load=person.work.load, seated=seated, strength=strength)
+    return Ergonomics(person.angles, rula_of(person), reba_of(person), owas_of(person), torques, person.seat)
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -20,7 +20,7 @@ from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import ComputedTogether, Surroundings, filled
+from wholebody.tasks.base import ComputedTogether, Surroundings, Term, filled
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.forces import GRAVITY, Force, Forces, Loads, point_rows, pressure, resolved
 
@@ -40,6 +40,7 @@ def _strength(value: object, where: str) -> Strength:
 
 
 StrengthOf = Annotated[Strength, _strength]
+_T = TypeVar("_T", bound="_HeldPerson")
 
 
 class Statics(NamedTuple):
@@ -141,7 +142,7 @@ class Statics(NamedTuple):
         return (whole - ROUND) / LEVER - float(force @ unit), moment @ d_moment / (whole * LEVER) - force @ d_unit
 
 
-def statics_of(scene: Surroundings, term: Exertion | StrengthLimit) -> Statics:
+def statics_of(scene: Surroundings, term: _HeldPerson) -> Statics:
     """What holds a scene's person, or one of several, under forces; standing, on both soles."""
     where, forces, person, standing = type(term).__name__, term.forces, term.person, term.standing
     joined, prefix = scene.figure, ""
@@ -175,7 +176,23 @@ def statics_of(scene: Surroundings, term: Exertion | StrengthLimit) -> Statics:
 
 
 @dataclass(frozen=True, eq=False)
-class Exertion(SumOfSquares):
+class _HeldPerson(Term):
+    """What is asked of the torques that hold a person; fields as of `Exertion`."""
+
+    forces: Forces = ()
+    _: KW_ONLY
+    strength: StrengthOf = Strength()  # noqa: RUF009
+    standing: bool = True
+    person: str = ""
+    statics: Statics = field(init=False, repr=False)
+
+    def resolve(self: _T, scene: Surroundings, start: Array) -> _T:
+        """Look up the joints and their strength."""
+        return filled(self, statics=statics_of(scene, self))
+
+
+@dataclass(frozen=True, eq=False)
+class Exertion(_HeldPerson, SumOfSquares):
     """Sum of the squared torques of joints over their strength: elbows go in, and who lifts comes near [no unit].
 
     Torques are those of the weight, the forces and, of somebody who stands, the ground (`Statics`). Joints without
@@ -196,17 +213,8 @@ class Exertion(SumOfSquares):
         >>> light = wb.ergonomics.Exertion([wb.Force("right_palm", (0, 0, -50))], weight=10.0)
     """
 
-    forces: Forces = ()
     _: KW_ONLY
-    strength: StrengthOf = Strength()  # noqa: RUF009
-    standing: bool = True
-    person: str = ""
     weight: inputs.Weight = 1.0
-    statics: Statics = field(init=False, repr=False)
-
-    def resolve(self, scene: Surroundings, start: Array) -> Exertion:
-        """Look up the joints and their strength."""
-        return filled(self, statics=statics_of(scene, self))
 
     def curvature_of(self, rows: Array, state: State) -> Array:
         """(nv,) the diagonal of Gauss and Newton."""
@@ -218,7 +226,7 @@ class Exertion(SumOfSquares):
 
 
 @dataclass(frozen=True, eq=False)
-class StrengthLimit(ComputedTogether):
+class StrengthLimit(_HeldPerson, ComputedTogether):
     """Keep joint torques within strength, and the compression of the disc L5/S1 within a bound.
 
     Rows are what is left: of the strength of each joint with published strength in either direction [share], and of the
@@ -238,18 +246,9 @@ class StrengthLimit(ComputedTogether):
         >>> limit = wb.ergonomics.StrengthLimit([wb.Force("right_palm", (0, 0, -50))], share=0.5)
     """
 
-    forces: Forces = ()
     _: KW_ONLY
-    strength: StrengthOf = Strength()  # noqa: RUF009
-    standing: bool = True
-    person: str = ""
     share: Annotated[float, Range(0.01, 10.0)] = 1.0
     compression: Annotated[float, Range(100.0, 1e5, "N")] | None = MOST
-    statics: Statics = field(init=False, repr=False)
-
-    def resolve(self, scene: Surroundings, start: Array) -> StrengthLimit:
-        """Look up the joints and their strength."""
-        return filled(self, statics=statics_of(scene, self))
 
     def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
         """(m,) what is left, and its derivative (m, nv)."""

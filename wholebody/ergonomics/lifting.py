@@ -18,7 +18,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import SIDES, check_person
-from wholebody.ergonomics.published import published
+from wholebody.ergonomics.observation import published
 from wholebody.figures.figure import Figure
 
 CLOSEST, FARTHEST = 25.0, 63.0  # cm, of H

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import overload
 
@@ -71,7 +71,6 @@ def solutions(
     most: int = 8,
     apart: float = 0.2,
     *,
-    method: QP | None = None,
     starts: int = 300,
     seed: int = 0,
     time_limit: float | None = None,
@@ -88,7 +87,6 @@ def solutions(
         most: how many answers are returned, those of the least measure.
         apart: least difference of two answers in some degree of freedom, radians or metres, whole turns of hinges left
             out; of two that are nearer the one of the lesser measure is kept.
-        method: settings of the descents; `QP()` if left out.
         starts: most descents.
         seed: of the random postures.
         time_limit: seconds after which it ends, the last descent too; the first always begins. None for no limit.
@@ -104,7 +102,6 @@ def solutions(
     starts = checks.whole(starts, "solutions: starts", 1, 100_000)
     apart = checks.number(apart, "solutions: apart", 1e-6, 100.0, "rad or m")
     seed = checks.whole(seed, "solutions: seed", 0, 2**32 - 1)
-    method = QP() if method is None else checks.instance(method, QP, "solutions: method", "give wb.methods.QP(...)")
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     known: list[Solution] = []
     begun = descents = 0
@@ -113,9 +110,9 @@ def solutions(
         left = ends - time.perf_counter()
         if left <= 0.0 and begun:
             break
-        left = max(left, 1e-9)  # the first descent begins however long it took to get here
-        timed = method if time_limit is None else replace(method, time_limit=min(left, method.time_limit or np.inf))
-        answer = next(timed.minima(problem, [start]))
+        # the first descent begins however long it took to get here
+        method = QP(time_limit=None if time_limit is None else max(left, 1e-9))
+        answer = next(method.minima(problem, [start]))
         begun += 1
         if answer.solved:
             descents += 1

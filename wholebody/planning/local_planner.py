@@ -9,7 +9,7 @@ held (as projections do, Berenson and others 2011).
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -38,39 +38,6 @@ INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints,
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
-class LocalPlanner(Protocol):
-    """Makes the edges of trees."""
-
-    searches: ClassVar[int]  # how many paths are looked for, of which the shortest counts; more = shorter, later
-    samples: ClassVar[int]  # of trees that look for a shorter path after the first; more = shorter paths, later
-    rounds: ClassVar[int]  # samples of trees until they get another end
-    tries: ClassVar[int]  # shortcuts in a row that fail; more = shorter paths, later
-    spacing: ClassVar[float]  # rad, m: between postures that are smoothed; smaller = nearer to the free path, dearer
-    shares: Array  # (nv,) by which freedoms count in the distance of two postures, as far as they move a point
-    partial: bool  # whether one joint may move in another way than before, and all others as they did
-
-    def admit(self, q: Array) -> None:
-        """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
-
-    def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
-        """Postures (nq,) of the motion from q towards a target (nq,), without q, and whether it gets there."""
-
-    def joined(self, q: Array, target: Array, most: float) -> list[Array]:
-        """Postures (nq,) of a motion from q to a target (nq,), without q, of at most so many radians and metres.
-
-        Empty where there is none.
-        """
-
-    def through(self, path: Array) -> list[Array]:
-        """Postures of a path (n, nq) without the first, where all motions between are free and allowed; else none."""
-
-    def settled(self, path: Array) -> tuple[Array, Mask]:
-        """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked.
-
-        Those that it has no time for stay as they are and count as blocked.
-        """
-
-
 class Seen(NamedTuple):
     """What is seen at a posture that keeps the distances."""
 
@@ -79,13 +46,18 @@ class Seen(NamedTuple):
 
 
 class Geodesics:
-    """Geodesics of Pinocchio, for figures that hold nothing."""
+    """Geodesics of Pinocchio, for figures that hold nothing.
 
-    searches: ClassVar[int] = 8
-    samples: ClassVar[int] = 600
-    rounds: ClassVar[int] = 50
-    tries: ClassVar[int] = 30
-    spacing: ClassVar[float] = 0.03
+    Attributes:
+        shares: (nv,) by which freedoms count in the distance of two postures, as far as they move a point.
+        partial: whether one joint may move in another way than before, and all others as they did.
+    """
+
+    searches: ClassVar[int] = 8  # how many paths are looked for, of which the shortest counts; more = shorter, later
+    samples: ClassVar[int] = 600  # of trees that look for a shorter path after the first; more = shorter paths, later
+    rounds: ClassVar[int] = 50  # samples of trees until they get another end
+    tries: ClassVar[int] = 30  # shortcuts in a row that fail; more = shorter paths, later
+    spacing: ClassVar[float] = 0.03  # rad, m: between postures that are smoothed; smaller = nearer to the path, dearer
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
@@ -112,7 +84,7 @@ class Geodesics:
         self.shares = levers / levers.max()
 
     def admit(self, q: Array) -> None:
-        """See `LocalPlanner`."""
+        """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
         self._required[near.number] = np.minimum(self._required[near.number], near.distance - NOISE)
         values = self._values.at(self._workspace.state)
@@ -124,7 +96,7 @@ class Geodesics:
         return self._seen(q) is not None
 
     def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
-        """See `LocalPlanner`."""
+        """Postures (nq,) of the motion from q towards a target (nq,), without q, and whether it gets there."""
         motion, way = np.asarray(pin.difference(self._model, q, target)), list[Array]()
         parts, seen, here = self._parts(motion), None, q
         for part in range(1, parts + 1):
@@ -138,7 +110,7 @@ class Geodesics:
         return way, True
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
-        """See `LocalPlanner`."""
+        """Postures (nq,) of a motion from q to a target (nq,), without q, no longer than `most`; else none."""
         motion = np.asarray(pin.difference(self._model, q, target))
         if np.linalg.norm(motion) > most or not self._joins(q, motion, self._seen(q), self._seen(target)):
             return []
@@ -146,7 +118,7 @@ class Geodesics:
         return [*(np.asarray(pin.integrate(self._model, q, k / parts * motion)) for k in range(1, parts)), target]
 
     def through(self, path: Array) -> list[Array]:
-        """See `LocalPlanner`."""
+        """Postures of a path (n, nq) without the first, where all motions between are free and allowed; else none."""
         seen = self._seen(path[0])
         for q, there in pairwise(path):
             ahead = self._seen(there)
@@ -156,7 +128,10 @@ class Geodesics:
         return list(path[1:])
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
-        """See `LocalPlanner`."""
+        """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked.
+
+        Those that it has no time for stay as they are and count as blocked.
+        """
         blocked, seen = np.ones(len(path) - 1, dtype=bool), self._seen(path[0])
         for k, pair in enumerate(pairwise(path)):
             if BUDGET.over:
@@ -238,7 +213,7 @@ class TrackedMotions:
         self._settling = QP(restarts=0).tracker(self._resting, 1.0)
 
     def admit(self, q: Array) -> None:
-        """See `LocalPlanner`."""
+        """See `Geodesics`."""
         self.geodesics.admit(q)
         least = np.array(self._problem.clearances)
         near = self._tracker.workspace.near(q, float(least.max(initial=0.0)) + NOISE)
@@ -246,18 +221,18 @@ class TrackedMotions:
         self._problem.clearances = self._resting.clearances = least
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
-        """See `LocalPlanner`; a geodesic if it may be, as it costs a tenth of steps."""
+        """See `Geodesics`; a geodesic if it may be, as it costs a tenth of steps."""
         if not self._held and (way := self.geodesics.joined(q, target, most)):
             return way
         way, met = self.towards(q, target, most)
         return way if met else []
 
     def through(self, path: Array) -> list[Array]:
-        """See `LocalPlanner`; by geodesics."""
+        """See `Geodesics`."""
         return self.geodesics.through(path)
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
-        """See `LocalPlanner`; ends where the motion is longer than `most`, radians and metres."""
+        """See `Geodesics`; ends where the motion is longer than `most`, radians and metres."""
         way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target)
         self._attraction.toward(target)
         if self._held:
@@ -271,7 +246,7 @@ class TrackedMotions:
         return way, True
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
-        """See `LocalPlanner`."""
+        """See `Geodesics`."""
         found, late = path.copy(), np.zeros(len(path), dtype=bool)
         for k, q in enumerate(path[1:-1], start=1):
             if BUDGET.over:
@@ -288,3 +263,7 @@ class TrackedMotions:
 
     def _rest(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(self.shares * pin.difference(self._model, q, target)))
+
+
+LocalPlanner: TypeAlias = Geodesics | TrackedMotions
+"""What makes the edges of trees."""

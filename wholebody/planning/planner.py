@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -52,6 +52,9 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
 )
+_End = tuple[Array | None, str]
+"""A posture (nq,) at which a motion may end, None where goals were not met; and why."""
+
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
@@ -137,7 +140,7 @@ def plan(
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         _check_end(problem, problem.start, "start")
         sampler = Sampler(problem, rng)
-        ends = _answers(problem, sampler) if goals else iter([_End(_posture(problem, goal))])
+        ends = _answers(problem, sampler) if goals else iter([(_posture(problem, goal), "")])
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
@@ -196,15 +199,8 @@ def _moved(problem: Problem, q: Array) -> float:
     return float(np.max([np.abs(pin.difference(model, problem.start, each)[still]).max() for each in q]))
 
 
-class _End(NamedTuple):
-    """A posture (nq,) at which a motion may end; None where goals were not met, and why."""
-
-    q: Array | None
-    why: str = ""
-
-
 def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
-    """Ends that meet the goals: that of the least measures, then those near random postures."""
+    """Ends that meet the goals: that of the least measures, then those near random postures; or why there is none."""
     bare = problem.with_start(problem.start)
     bare.measures = ()  # these lead most starts to one end
     for number in range(ENDS):
@@ -214,11 +210,11 @@ def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
             solution = QP(restarts=0, budget=0).solve(bare.with_start(sampler.near(problem.start, number / (ENDS - 1))))
         # Half of the ends are on any side of whole turns: things can block the nearest.
         near = problem.start if number < ENDS // 2 else sampler.anywhere()
-        end = sampler.turns.nearest(solution.q, near) if solution.solved else None
+        end = sampler.turned(solution.q, near) if solution.solved else None
         # a goal or a constraint on joint values may be met on one side of a whole turn alone
         if end is not None and not np.array_equal(end, solution.q) and not meets(assess(problem, end), QP().tolerance):
             end = solution.q
-        yield _End(end, solution.message)
+        yield end, solution.message
 
 
 class _Search:
@@ -280,20 +276,20 @@ class _Search:
         while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else AGAIN) or not self._begun):
             self._begun = True
             if rounds % self._local.rounds == 0 or not ends:
-                end = next(self._ends, None)
-                if end is None and not ends:
+                q, why = next(self._ends, (None, ""))
+                if q is None and not why and not ends:
                     break
-                if end is not None and end.q is None:
-                    self._said = self._said or end.why
+                if q is None and why:
+                    self._said = self._said or why
                     continue
-                if end is not None and end.q is not None:
-                    self._slides.admit(end.q)
-                    self._reached.append(end.q)
-                    if self._apart(start, end.q) < most:
-                        ends.append(end.q)
-                        if led := self._led(end.q):
+                if q is not None:
+                    self._slides.admit(q)
+                    self._reached.append(q)
+                    if self._apart(start, q) < most:
+                        ends.append(q)
+                        if led := self._led(q):
                             return led, trees
-                        trees.add_end(end.q)
+                        trees.add_end(q)
                 if not ends:
                     continue
             rounds += 1

@@ -6,7 +6,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
@@ -19,27 +18,6 @@ def holds(problem: Problem) -> bool:
     return any(bool(np.any(term.lower == term.upper)) for term in problem.constraints)
 
 
-class Turns:
-    """Hinges whose limits are a whole turn apart or more: postures a turn apart there are the same but for limits."""
-
-    def __init__(self, figure: Figure) -> None:
-        hinges = (
-            [] if figure.followers else [j for j in figure.model.joints[1:] if j.shortname().startswith("JointModelR")]
-        )
-        places = np.array([joint.idx_q for joint in hinges if joint.nq == 1], dtype=np.intp)
-        low, high = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
-        wide = high - low >= 2.0 * np.pi
-        self._places, self._low, self._high = places[wide], low[wide], high[wide]
-
-    def nearest(self, q: Array, near: Array) -> Array:
-        """The posture q (nq,), turned as near to another one as limits let it."""
-        found, here, turn = np.array(q), q[self._places], 2.0 * np.pi
-        least, most = np.ceil((self._low - here) / turn), np.floor((self._high - here) / turn)
-        turns = np.maximum(least, np.minimum(most, np.round((near[self._places] - here) / turn)))
-        found[self._places] = here + turn * turns
-        return found
-
-
 class Sampler:
     """Draws postures of a problem; what is frozen stays."""
 
@@ -48,7 +26,22 @@ class Sampler:
         self._frozen = still_dofs(problem)
         self._roots = [self._figure.model.joints[root] for root in self._figure.roots.values()]
         self._drawn: list[Array] = []
-        self.turns = Turns(self._figure)
+        model = self._figure.model
+        hinges = (
+            [] if self._figure.followers else [j for j in model.joints[1:] if j.shortname().startswith("JointModelR")]
+        )
+        places = np.array([joint.idx_q for joint in hinges if joint.nq == 1], dtype=np.intp)
+        low, high = model.lowerPositionLimit[places], model.upperPositionLimit[places]
+        wide = high - low >= 2.0 * np.pi
+        self._turning, self._low, self._high = places[wide], low[wide], high[wide]
+
+    def turned(self, q: Array, near: Array) -> Array:
+        """The posture q (nq,) with whole turns of hinges, as near to another one as limits let it."""
+        found, here, turn = np.array(q), q[self._turning], 2.0 * np.pi
+        least, most = np.ceil((self._low - here) / turn), np.floor((self._high - here) / turn)
+        turns = np.maximum(least, np.minimum(most, np.round((near[self._turning] - here) / turn)))
+        found[self._turning] = here + turn * turns
+        return found
 
     def anywhere(self) -> Array:
         """A random posture (nq,) within limits, whatever is held."""
@@ -64,7 +57,7 @@ class Sampler:
         places are small, and in half of the postures it turns, about the vertical or about any axis.
         """
         model, rng = self._figure.model, self._rng
-        away = spread * np.asarray(pin.difference(model, q, self.turns.nearest(self.anywhere(), q)))
+        away = spread * np.asarray(pin.difference(model, q, self.turned(self.anywhere(), q)))
         for joint in self._roots:
             here = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7])
             turns = not self._held and rng.uniform() < 0.5

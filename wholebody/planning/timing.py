@@ -124,26 +124,24 @@ def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Ar
         most[k] = min(most[k], _largest(first[k], second[k], acceleration, most[k + 1]))
     b = np.zeros(count)
     for k in range(count - 1):
-        *_, high, slope = _bounds_of_u(first[k], second[k], acceleration)
+        high, slope = _bounds_of_u(first[k], second[k], acceleration)
         b[k + 1] = min(most[k + 1], b[k] + 2.0 * float((high + slope * b[k]).min(initial=1e12)))
     return b
 
 
-def _bounds_of_u(first: Array, second: Array, acceleration: Array) -> tuple[Array, Array, Array, Array]:
-    """Coefficients: u lies between ``low + low_slope b`` and ``high + high_slope b``, for each joint that moves."""
+def _bounds_of_u(first: Array, second: Array, acceleration: Array) -> tuple[Array, Array]:
+    """Coefficients: u lies between ``slope b - high`` and ``slope b + high``, for each joint that moves."""
     moving = np.abs(first) > 1e-12
-    size, turn = np.abs(first[moving]), second[moving] / first[moving]
-    reach = acceleration[moving] / size
-    return -reach, -turn, reach, -turn
+    return acceleration[moving] / np.abs(first[moving]), -second[moving] / first[moving]
 
 
 def _largest(first: Array, second: Array, acceleration: Array, following: float) -> float:
     """The largest b from which some u leads to at most a b of `following` at the next point."""
-    low, low_slope, high, high_slope = _bounds_of_u(first, second, acceleration)
+    high, slope = _bounds_of_u(first, second, acceleration)
     # 0 <= b + 2 u <= following
-    low, low_slope = np.append(low, 0.0), np.append(low_slope, -0.5)
-    high, high_slope = np.append(high, 0.5 * following), np.append(high_slope, -0.5)
-    steeper = low_slope[:, None] - high_slope[None, :]
+    low, slope = np.append(-high, 0.0), np.append(slope, -0.5)
+    high = np.append(high, 0.5 * following)
+    steeper = slope[:, None] - slope[None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = np.where(steeper > 1e-12, (high[None, :] - low[:, None]) / steeper, np.inf)
     return float(max(0.0, crossing.min()))

@@ -19,10 +19,11 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, KeptRecords, Records, SolveRecord
-from wholebody.studies.solving import Case, Run, Sender, at_once, sent_to, solve_runs
+from wholebody.studies.solving import Case, Run, Sender, batch_answers, run_batches, sent_to, solve_runs
 from wholebody.tasks.answers import is_own
 
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
+LARGEST = 256  # problems of a batch. Larger: fewer calls; smaller: earlier progress, processes end together
 TOGETHER = 16  # cases of a job. More: fewer scenes are sent, and processes end less together
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
 
@@ -134,31 +135,22 @@ def solve_many(
     for number, (name, problem) in enumerate(named):
         asked = "" if store is None else fingerprint(problem, running.method, warm_start)
         cases.append(Case(SolveRecord(name), _Given(problem), asked, (number,)))
-    return run_cases(runs_of(cases, RUN if warm_start else 1), running, store)
-
-
-def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
-    """Cases in runs of a length; within a run each begins at the answer of the one before."""
-    return [list(cases[k : k + length]) for k in range(0, len(cases), length)]
+    return run_cases(cases, warm_start, running, store)
 
 
 @ctrl_c_ends_all()
 def run_cases(
-    runs: Sequence[Sequence[Case]], running: Running, store: KeptRecords | None = None, *, lowers: bool = True
+    order: Sequence[Case], warm_start: bool, running: Running, store: KeptRecords | None, *, lowers: bool = True
 ) -> Records:
-    """Solve cases; those of one run warm-start one from the other. The store has what was done before.
+    """Solve cases; with `warm_start` those of a run begin one at the answer of the other. The store has earlier ones.
 
     `lowers`: whether neighbours whose postures jump are solved again for a lower measure, see `neighbours.lower`.
     """
-    order = [case for run in runs for case in run]
     found = {} if store is None else {k: store.done(case.asked) for k, case in enumerate(order)}
     done = {k: replace(record, name=order[k].record.name, factors=order[k].record.factors)
             for k, record in found.items() if record is not None}  # fmt: skip
-    tell = running.progress
-    numbered, first = [], 0
-    for run in runs:
-        numbered.append(range(first, first + len(run)))
-        first += len(run)
+    tell, length = running.progress, RUN if warm_start else 1
+    numbered = [range(k, min(k + length, len(order))) for k in range(0, len(order), length)]
 
     def keep(number: int, record: SolveRecord) -> bool:
         done[number] = record
@@ -170,14 +162,7 @@ def run_cases(
     waiting = [run for run in numbered if any(k not in done for k in run)]
     asked = [k for run in waiting for k in run if k not in done]
     if not over and hasattr(running.method, "batches") and _is_quick([order[k] for k in asked], running):
-        with closing(
-            at_once([order[k].make() for k in asked], running.method, running.jobs, running.cluster)
-        ) as answers:
-            for place, answer in answers:
-                record = order[asked[place]].record  # `replace` would take three times as long
-                over = keep(asked[place], SolveRecord(record.name, factors=record.factors, **answer))
-                if over:
-                    break
+        over = _at_once(asked, order, running, keep)
     settled = done.keys() & asked
     # The first of each run begin at each other's answers, one after the other, and the rest of a run at its first: so
     # all runs are of one family of postures, whatever `jobs` is.
@@ -204,6 +189,21 @@ def run_cases(
 def _solved_before(number: int, run: Iterable[int], done: Mapping[int, SolveRecord]) -> int | None:
     """The last case of a run before one that is solved; None if none is."""
     return max((j for j in run if j < number and j in done and done[j].solved), default=None)
+
+
+def _at_once(
+    asked: Sequence[int], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool]
+) -> bool:
+    """Solve those cases that a method with `batches` answers many of at a time; whether the caller ended them."""
+    batches = running.method.batches([order[k].make() for k in asked], LARGEST)  # type: ignore[attr-defined]
+    work = {number: ([asked[k] for k in batch.places], batch) for number, batch in enumerate(batches)}
+    with closing(_answers(run_batches, work, order, running)) as outcomes:
+        for number, answers, error in outcomes:
+            for k, answer in batch_answers(batches[number], answers) if error is None else ():
+                record = order[asked[k]].record  # `replace` would take three times as long
+                if keep(asked[k], SolveRecord(record.name, factors=record.factors, **answer)):
+                    return True
+    return False
 
 
 def _computed(order: Sequence[Case], running: Running, function: Callable[..., Any], work: Work) -> dict[Any, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import os
 from dataclasses import dataclass, field
@@ -11,9 +12,13 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.charts import Shown, png
-from wholebody.base.files import checked_target, write
+from wholebody.base.charts import Shown, new_chart, plain, png
+from wholebody.base.files import checked_target, templates, write
 from wholebody.problem import Problem
+
+INCHES = 2.4  # width of one height
+MEANING = "above 0: reached, 1 with the least measure\nbelow 0: metres short; gray: inside a thing"
+INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
 VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")  # Words of the codes of a verdict
@@ -137,10 +142,26 @@ class ReachMap(Shown):
         return write(file, "\n".join(lines) + "\n")
 
     def plot(self) -> Any:
-        """Draw heat maps of all heights, a matplotlib figure."""
-        from wholebody.studies.pictures import slices_chart
-
-        return slices_chart(self)
+        """Draw heat maps of all heights seen from above, beside each other, a matplotlib figure."""
+        # heights in one picture; of more, some are left out evenly
+        shown = np.unique(np.linspace(0, len(self.z) - 1, min(len(self.z), 24)).round().astype(int)).tolist()
+        rows = -(-len(shown) // 6)  # columns
+        columns = -(-len(shown) // rows)
+        deep, wide = (float(np.ptp(places)) + 0.1 for places in (self.x, self.y))
+        high = INCHES * min(max(deep / wide, 0.4), 2.5) + 0.75  # inches of one height for its title and its axis
+        chart, axes = new_chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 3.0)))
+        values = self._heat()
+        image: Any = None
+        for axis in axes.flat[len(shown) :]:
+            axis.set_axis_off()
+        for axis, k in zip(axes.flat, shown, strict=False):
+            image = self._slice(axis, values, k)
+        bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
+        bar.set_label(MEANING, fontsize="x-small")
+        bar.ax.tick_params(labelsize="x-small")
+        reached = f"{self.share:.0%} of {self.verdict.size} places reached, seen from above"
+        chart.suptitle(f"{plain(self.frame)}\n{reached}", fontsize="medium")
+        return chart
 
     def picture(self, path: str | os.PathLike[str]) -> Path:
         """Write `plot` into a PNG file; returns the path."""
@@ -148,6 +169,47 @@ class ReachMap(Shown):
 
     def html(self, path: str | os.PathLike[str]) -> Path:
         """Write a page with a slider over the heights, for any browser, without a network; returns the path."""
-        from wholebody.studies.pictures import write_page
+        file = checked_target(path, "html: path", "a page", (".htm", ".html"))
+        values, images = self._heat(), []
+        for k, height in enumerate(self.z.tolist()):
+            chart, axes = new_chart(1, 1, (6.4, 5.2))
+            image = self._slice(axes[0, 0], values, k)
+            chart.colorbar(image, ax=axes[0, 0]).set_label(MEANING, fontsize="small")
+            images.append((height, base64.b64encode(png(chart)).decode()))
+        facts = {**self.counts(), "solves": self.solves, "reached": self.extent}
+        first = int(np.argmax(self.reached.sum(axis=(0, 1))))
+        page = templates(Path(__file__).parent).get_template("reach.html.jinja")
+        return write(file, page.render(title=f"Reach of {self.frame}", facts=facts, first=first, images=images))
 
-        return write_page(self, checked_target(path, "html: path", "a page", (".htm", ".html")))
+    def _heat(self) -> Array:
+        """(nx, ny, nz) minus the distance that is left, metres; where reached, 1 for the least measure to 0."""
+        values: Array = -np.asarray(self.left, dtype=float)
+        reached = self.reached
+        if reached.any():
+            measures = self.measure[reached]
+            span = float(np.ptp(measures))
+            values[reached] = (measures.max() - measures) / span if span > 0.0 else 1.0
+        return values
+
+    def _slice(self, axis: Any, values: Array, k: int) -> Any:
+        """Draw one height: reached places green, the others by their residual, places inside of things gray."""
+        from matplotlib.colors import LinearSegmentedColormap
+
+        colors = LinearSegmentedColormap.from_list(
+            "reach", [(0.0, "#7f0000"), (0.25, "#d7301f"), (0.4999, "#fdd0a2"), (0.5, "#c7e9c0"), (1.0, "#00441b")]
+        )
+        half = [0.5 * float(places[1] - places[0]) if len(places) > 1 else 0.05 for places in (self.x, self.y)]
+        extent = (self.y[0] - half[1], self.y[-1] + half[1], self.x[0] - half[0], self.x[-1] + half[0])
+        image = axis.imshow(
+            values[:, :, k], origin="lower", extent=extent, cmap=colors, vmin=-1.0, vmax=1.0, interpolation="nearest"
+        )
+        gray = np.zeros((*values.shape[:2], 4))
+        gray[self.inside[:, :, k]] = INSIDE_GRAY
+        axis.imshow(gray, origin="lower", extent=extent, interpolation="nearest")
+        axis.invert_xaxis()
+        axis.set_title(f"z = {self.z[k]:.2f} m", fontsize="small")
+        axis.set_xlabel("y, left [m]", fontsize="x-small")
+        axis.set_ylabel("x, forward [m]", fontsize="x-small")
+        axis.tick_params(labelsize="x-small")
+        axis.locator_params(nbins=5)
+        return image

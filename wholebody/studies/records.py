@@ -7,19 +7,38 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
-from wholebody.base.charts import Shown, png
+from wholebody.base.charts import Shown, new_chart, plain, png
+from wholebody.base.errors import InputError
 from wholebody.base.files import checked_target, csv_text, write
 from wholebody.base.records import RecordFile
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
 JUDGED = ("goal_error", "goal_angle", "penetration", "limit_violation", "constraint_violation", "measure")
+
+
+MOST = 100  # rows or columns; letters of more are too small to read
+WIDTH, HEIGHT = 0.9, 0.3  # inches of a cell
+
+COLORS: Mapping[str, str] = MappingProxyType(
+    {
+        "solved": "#009e73",
+        "unreachable": "#e69f00",
+        "infeasible": "#d55e00",
+        "stalled": "#cc79a7",
+        "refused": "#999999",
+        "ended": "#666666",
+        "cancelled": "#dddddd",
+    }
+)
+"""Of outcomes, by Okabe and Ito (2008), whose colours are also told apart by people who are colour-blind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,9 +192,43 @@ class Records(Shown, Sequence[SolveRecord]):
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
                 outcome that no solve has.
         """
-        from wholebody.studies.pictures import outcomes_chart
+        from matplotlib.patches import Patch
 
-        return outcomes_chart(self._records)
+        if unknown := {one.outcome for one in self} - COLORS.keys():
+            raise InputError(f"chart: no outcome is called {sorted(unknown)[0]!r}; outcomes are {', '.join(COLORS)}")
+        factors = [one.factors or {"": one.name} for one in self]
+        places = [
+            (", ".join(value for factor, value in each.items() if factor != "target"), each.get("target", ""))
+            for each in factors
+        ]
+        if twice := [place for place, count in Counter(places).items() if count > 1]:
+            name = ", ".join(filter(None, twice[0]))
+            raise InputError(f"chart: {places.count(twice[0])} records are called {name!r}; give records of one run")
+        rows, columns = (list(dict.fromkeys(place[k] for place in places)) for k in (0, 1))
+        if not 0 < max(len(rows), len(columns)) <= MOST:
+            raise InputError(
+                f"chart: {len(rows)} rows and {len(columns)} columns; give records of 1 to {MOST} of each, such as "
+                "a part"
+            )
+        wide = WIDTH * len(columns) + 0.09 * max(map(len, rows)) + 1.8  # inches of a letter of a row's name
+        chart, axes = new_chart(1, 1, (wide, HEIGHT * len(rows) + 1.2))
+        axis = axes[0, 0]
+        for one, (row, column) in zip(self, places, strict=True):
+            x, y = columns.index(column), rows.index(row)
+            axis.fill([x, x + 1, x + 1, x], [y, y, y + 1, y + 1], facecolor=COLORS[one.outcome], edgecolor="white")
+            if one.goal_error > 0.0 and not one.solved:
+                axis.text(
+                    x + 0.5, y + 0.5, f"{1e3 * one.goal_error:.0f} mm", ha="center", va="center", fontsize="x-small"
+                )
+        axis.set(xlim=(0, len(columns)), ylim=(len(rows), 0))
+        # so that matplotlib reads no formula in a name
+        axis.set_xticks(np.arange(len(columns)) + 0.5, [*(plain(name) for name in columns)], fontsize="x-small")
+        axis.set_yticks(np.arange(len(rows)) + 0.5, [*(plain(name) for name in rows)], fontsize="x-small")
+        axis.tick_params(length=0)
+        seen = {one.outcome for one in self}
+        patches = [Patch(facecolor=color, label=outcome) for outcome, color in COLORS.items() if outcome in seen]
+        chart.legend(handles=patches, loc="outside right upper", fontsize="x-small", frameon=False)
+        return chart
 
     def chart(self, path: str | os.PathLike[str]) -> Path:
         """Write `plot` into a PNG file, and raise the same; returns the path."""

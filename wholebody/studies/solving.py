@@ -6,7 +6,7 @@ import hashlib
 import io
 import pickle
 from collections import OrderedDict
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, NamedTuple
 
@@ -14,9 +14,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, as_dict
-from wholebody.base.batches import run_batch, shared
 from wholebody.base.errors import WholebodyError, one_line
-from wholebody.base.runner import Job, packed
+from wholebody.base.runner import packed
 from wholebody.methods.base import Method, check_problem
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
@@ -36,7 +35,6 @@ Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
 NEAR = 50  # programs of a solve from another's answer. Of 61 that succeeded none took over 20; more cost misses alone.
-LARGEST = 256  # problems of a batch. Larger: fewer calls; smaller: earlier progress, processes end together.
 
 
 @dataclass(frozen=True)
@@ -137,27 +135,12 @@ def warmed(method: Any) -> Any:
         return method
 
 
-def at_once(
-    problems: Sequence[Problem], method: Any, jobs: int, cluster: str | None
-) -> Generator[tuple[int, dict[str, Any]], None, None]:
-    """Solve those problems that a method with `batches` answers many of at a time: place and record of each solved."""
-    sender = Sender()
-
-    def there(batches: list[Any], full: bool) -> Job:
-        return Job(batches, sent_to, (lambda given: [one.run() for one in given], sender.sent(batches, full)), 0.0)
-
-    batches = method.batches(problems, LARGEST)
-    if cluster is None:
-        found = shared(batches, jobs, lambda batch: batch.run(), there)
-    else:
-        ended = run_batch((there([batch], True) for batch in batches), jobs, cluster)
-        found = ((job.name[0], answer and answer[0], error) for job, _, answer, error in ended)
-    for batch, answers, error in found:
-        if error is None:
-            yield from _records(batch, answers)
+def run_batches(batches: Sequence[Any], _method: Method) -> list[Any]:
+    """Answers of batches that a method with `batches` made."""
+    return [batch.run() for batch in batches]
 
 
-def _records(batch: Any, answers: Any) -> Iterator[tuple[int, dict[str, Any]]]:
+def batch_answers(batch: Any, answers: Any) -> Iterator[tuple[int, dict[str, Any]]]:
     """The place of each problem of a batch that is solved, and what its record says."""
     seconds = answers.seconds / len(batch.places)
     columns = {name: values.tolist() for name, values in as_dict(answers.judged).items() if name in JUDGED}

@@ -20,7 +20,7 @@ from wholebody.figures import Figure, load
 from wholebody.figures.anthropometry import Person, design_cases, make_person
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
-from wholebody.studies.many import RUN, Running, RunOptions, run_cases, runs_of
+from wholebody.studies.many import Running, RunOptions, run_cases
 from wholebody.studies.records import KeptRecords, Records, SolveRecord
 from wholebody.studies.solving import Case
 from wholebody.studies.study_files import SIZE, TaskFile
@@ -93,7 +93,7 @@ def study(
 def planned(
     task: TaskFunction | str | os.PathLike[str], varied: Mapping[str, Any], method: str | Method | None,
     run: Callable[..., Running], warm_start: bool, folder: str | os.PathLike[str] | None,
-) -> tuple[list[list[Case]], Running, KeptRecords | None]:  # fmt: skip
+) -> tuple[list[Case], bool, Running, KeptRecords | None]:  # fmt: skip
     """What `run_cases` takes of the arguments of `study`; `run` makes of a method how cases are run."""
     what = "study"
     make: TaskFile | TaskFunction
@@ -132,7 +132,7 @@ def planned(
             asked = fingerprint(marks[who], target, layout, running.method, warm_start) if store else ""
             record = SolveRecord(", ".join(named.values()), factors=named)
             cases.append(Case(record, variant, asked, (i, j, k)))
-    return runs_of(cases, RUN if warm_start else 1), running, store
+    return cases, warm_start, running, store
 
 
 def _check_takes_three(task: Any, what: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -111,19 +110,6 @@ class TaskFile:
         return dict(layout)
 
 
-@dataclass(frozen=True)
-class StudyFile:
-    """The content of a study file: the arguments of `wb.study`."""
-
-    path: Path  # the file
-    task: Path  # the task file
-    people: dict[str, Any] | None  # by name; None where the file has none
-    targets: dict[str, Any] | None
-    layouts: dict[str, Any] | None
-    method: str | None  # None for that of the task
-    warm_start: bool  # see `wb.study`
-
-
 _TOP = (Key("task", Text(), True), Key("method", Choice(tuple(METHODS))), Key("warm_start", Flag()))
 _NAME = Key("name", Text(), True)
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
@@ -134,18 +120,19 @@ _TABLES = {
 }
 
 
-def read_study(path: Path) -> StudyFile:
-    """Read a study file; paths in it are relative to its folder."""
+def read_study(path: Path) -> dict[str, Any]:
+    """The arguments of `wb.study` that a study file says; paths in it are relative to its folder."""
     contents = contents_of(path, "study file", _TOP, _TABLES)
     top, where = contents.top.values, contents.top.where
     task = path.parent / top["task"]
     if not is_file(task):
         there = sorted(file.name for file in task.parent.glob("*.toml")) if task.parent.is_dir() else []
         raise UnknownNameError("task file", top["task"], there, str(where.at("task")))
-    people, targets, layouts = (_by_name(contents, table) for table in _TABLES)
-    if not (people or targets or layouts):
+    found = {f"{factor}s": _by_name(contents, factor) for factor in ("target", "layout")}
+    found["people"] = _by_name(contents, "person")
+    if not any(found.values()):
         raise where.fault("nothing varies; write a [[person]], [[target]] or [[layout]]")
-    return StudyFile(path, task, people, targets, layouts, top.get("method"), top.get("warm_start", False))
+    return {**found, **top, "task": task}
 
 
 def _by_name(contents: Contents, table: str) -> dict[str, Any] | None:

@@ -56,13 +56,13 @@ class Asked:
         return Rows(node, gap, (np.ones((1, 1)),), np.zeros(1, dtype=np.intp), np.zeros(0), np.zeros((0, 1)))
 
 
-def asked(least: float, early: bool, share: float = 1.0, rough: bool = False) -> SQPResult:
+def asked(least: float, early: bool, share: float = 1.0) -> SQPResult:
     """What a run of three frames ends with that begins with no deviation."""
     wide, free = np.full((3, 1), 9.0), np.full((2, 1), np.inf)
     limits, objective = Limits(-wide, wide, -free, free), Objective(3, np.ones(1), 0.0, 1.0, (False, False))
     looking: Any = Asked(least, share)
     program = WindowProgram(looking, objective, limits, 60)
-    return program.run(np.zeros((3, 1)), lambda number, worst: False, early=early, rough=rough)
+    return program.run(np.zeros((3, 1)), lambda number, worst: False, early=early)
 
 
 def test_a_run_whose_steps_gain_little_ends_early_where_there_are_others() -> None:
@@ -77,14 +77,6 @@ def test_a_run_that_gains_what_its_steps_ask_for_goes_on() -> None:
     found = asked(0.25, True)
     assert found.met
     assert found.x == pytest.approx(np.full((3, 1), 0.25), abs=10.0 * MET)
-
-
-def test_a_rough_run_ends_once_little_is_missed() -> None:
-    rough, whole = asked(0.25, True, rough=True), asked(0.25, True)
-    assert rough.end is End.ROUGH
-    assert whole.end is End.LAST
-    assert rough.worst <= 2e-3
-    assert rough.programs <= whole.programs
 
 
 def test_what_follows_a_frame_stays_on_its_side(planar_arm: Callable[..., Figure]) -> None:
@@ -164,42 +156,6 @@ def test_what_is_held_is_met_to_a_tenth_of_a_millimetre(contact: float, held: fl
     objective = Objective(3, np.ones(1), 0.0, 1.0, (False, False))
     program = WindowProgram(looking, objective, Limits(none, none, -free, free), 3)
     assert program.run(none, lambda number, worst: False).met is met
-
-
-def runs_of_a_window(
-    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch, frames: int, passed: float
-) -> list[tuple[np.ndarray, bool, bool, np.ndarray]]:
-    """Runs of a clip that is one window, with how deep motions between frames are said to pass something at first.
-
-    Returns:
-        Deviations of the beginning, whether it may end early, whether it is rough, and deviations of the end.
-    """
-    figure = planar_arm((0.5, 0.5))
-    clip = wb.Clip(figure, np.stack([np.linspace(-0.3, 0.3, frames), np.full(frames, 0.5)], axis=1), 1 / 30)
-    scene = wb.Scene(figure)
-    scene.add(wb.Sphere(0.1), name="ball", at=(0.8, 0.1, 0.0))
-    run, runs, said = WindowProgram.run, [], [passed]
-
-    def told(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
-        found = run(self, x, *given)
-        early, rough = given[3:5] if len(given) > 4 else (False, False)
-        runs.append((x, early, rough, found.x))
-        return found
-
-    monkeypatch.setattr(WindowProgram, "run", told)
-    monkeypatch.setattr(window_run, "depths_between", lambda *given: {0: said.pop() if said else 0.0})
-    freed = wb.avoid(clip, scene, method=wb.motion.Trajectory(margin=10.0, time=0.1))
-    assert freed.report.solved, freed.report.message
-    return runs
-
-
-@pytest.mark.parametrize(("passed", "ends"), [(0.029, False), (0.031, True)])
-def test_what_passes_a_thing_by_more_than_a_step_asks_for_ends_an_attempt(
-    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch, passed: float, ends: bool
-) -> None:
-    first, second, *_ = runs_of_a_window(planar_arm, monkeypatch, 60, passed)
-    assert not first[0].any()
-    assert np.array_equal(second[0], first[3]) is not ends
 
 
 def test_a_long_window_is_freed_in_parts_without_seams(

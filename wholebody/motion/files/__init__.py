@@ -64,17 +64,17 @@ def check_ending(path: str | os.PathLike[str], *, bare: bool = False) -> Path:
 def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
     """Read postures of a figure from a file in the format that the ending of its name says; see `wb.read_clip`."""
     path = checked_path(path, "path")
-    return READERS[_ending(path, READERS, "read", (".bvh", ".glb", ".gltf"))](path, figure)
+    return READERS[_ending(path, {*READERS, *SKELETONS}, "read")](path, figure)
 
 
-def _ending(path: Path, known: Collection[str], done: str, others: Collection[str] = ()) -> str:
-    """The ending of a file's name, one of some; the error names `others` too, which `wb.read_clip` takes before."""
+def _ending(path: Path, known: Collection[str], done: str) -> str:
+    """The ending of a file's name, one of some."""
     ending = path.suffix.lower()
     if ending == ".fbx" and done == "read":
         raise FileFormatError(f"{one_line(path.name)}: {FBX}")
     if ending not in known:
         raise FileFormatError(
             f"{one_line(path.name)}: a clip cannot be {done} as {one_line(ending) or 'a file without ending'}; "
-            f"give one of {', '.join(sorted({*known, *others}))}"
+            f"give one of {', '.join(sorted(known))}"
         )
     return ending

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wholebody.base.arrays import Array, Indices
@@ -30,10 +29,9 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     ours = mark == MARK and bool(rest)
     if ours:
         unit, up, found.joints[0].name = unit or MARK, up or "y", rest
-    offsets, root, notes = _offsets(found)
-    notes = [*found.notes, *notes]
+    parents, offsets = found.parents, np.array([joint.offset for joint in found.joints])
+    notes = [*found.notes, *_mean_offsets(found, parents, offsets)]
     angles, local = _rotations(found)
-    parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)
     if longest_way(parents, offsets) == 0.0:
         raise FileFormatError(f"{path.name}: all joints of the skeleton are at one place; give their offsets")
     top = 0 if ours else _moved_joint(found, parents, offsets)
@@ -47,54 +45,51 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     first = int(not ours and _begins_with_rest(angles[:, 1:]))
     if first:
         notes.append("the first frame is the rest posture and no part of the motion; it is left out")
-    turn, scale = UP[up], UNITS[unit]
-    local = turn @ local[first:] @ turn.T
-    places = scale * root[first:] @ turn.T
-    kept = list(range(len(names)))
     if top:
-        places, local = _from_the_world(
-            top, places, scale * _positions(found, top)[first:] @ turn.T, parents, local, offsets, scale * turn
-        )
         notes = [note for note in notes if f"the bone to {names[top]} changes" not in note]
         notes.append(f"{names[top]} moves below {names[0]}, which is left out")
-        kept = _below(top, parents)
-        names, offsets, local = tuple(names[k] for k in kept), offsets[kept], local[:, kept]
-        offsets[0] = 0.0
-        parents = np.array([kept.index(int(parents[k])) if k != top else -1 for k in kept], dtype=np.intp)
+    scale = UNITS[unit] * UP[up]
+    local, root = UP[up] @ local[first:] @ UP[up].T, found.positions(0)[first:] @ scale.T
     try:
         motion = SkeletonMotion.moved(
-            names, parents, scale * offsets @ turn.T, local, places, found.dt, title_of(path), tuple(notes)
+            names, parents, offsets @ scale.T, local, root, found.dt, title_of(path), tuple(notes)
         )
-        return _lengthened(motion, found, kept, first, scale * turn)
+        motion = _lengthened(motion, found, first, scale)
+        return _from(top, motion) if top else motion
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
 
 
-def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> SkeletonMotion:
+def _lengthened(motion: SkeletonMotion, found: BvhText, first: int, scale: Array) -> SkeletonMotion:
     """The motion with the places of the joints where the lengths of bones change."""
-    moving = [
-        any(values.any() for (_, kind), values in columns.items() if kind == "position") for columns in _columns(found)
-    ]
-    if not any(moving[source] for source in kept[1:]):
+    moving = [found.moves(joint) for joint in range(len(found.joints))]
+    if not any(moving[1:]):
         return motion
     positions = np.array(motion.positions)
-    for joint, source in enumerate(kept[1:], 1):
+    for joint in range(1, len(moving)):
         parent = motion.parents[joint]
-        step: Array = _positions(found, source)[first:] @ scale.T if moving[source] else motion.offsets[joint]
+        step: Array = found.positions(joint)[first:] @ scale.T if moving[joint] else motion.offsets[joint]
         turned = np.einsum("nij,nj->ni", motion.rotations[:, parent], np.broadcast_to(step, (len(motion), 3)))
         positions[:, joint] = positions[:, parent] + turned
     return replace(motion, positions=positions)
 
 
-def _positions(found: BvhText, joint: int) -> Array:
-    """Positions of a joint in its parent (n, 3): its channels, and its offset where it has none."""
-    columns = _columns(found)[joint]
-    still = np.zeros(len(found.table))
-    offset = found.joints[joint].offset
-    return np.stack([columns.get(("XYZ"[axis], "position"), still + offset[axis]) for axis in range(3)], axis=1)
+def _from(top: int, motion: SkeletonMotion) -> SkeletonMotion:
+    """The part of a moving skeleton from a joint on."""
+    kept, parents = [top], [-1]
+    for joint in range(top + 1, len(motion.parents)):
+        if motion.parents[joint] in kept:
+            parents.append(kept.index(int(motion.parents[joint])))
+            kept.append(joint)
+    offsets = motion.offsets[kept]
+    offsets[0] = 0.0
+    return SkeletonMotion(
+        tuple(motion.names[joint] for joint in kept), np.array(parents), offsets, motion.rotations[:, kept],
+        motion.positions[:, kept], motion.dt, motion.name, motion.notes,
+    )  # fmt: skip
 
 
-def _moved_joint(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> int:
+def _moved_joint(found: BvhText, parents: Indices, offsets: Array) -> int:
     """The joint whose positions move the skeleton below a root that carries nothing else; 0 for the root itself."""
     size, at = longest_way(parents, offsets), 0
     while True:
@@ -102,33 +97,8 @@ def _moved_joint(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> i
         if len(below) != 1:
             return 0
         at = below[0]
-        if np.ptp(_positions(found, at), axis=0).max() > 0.01 * size:
+        if np.ptp(found.positions(at), axis=0).max() > 0.01 * size:
             return at
-
-
-def _below(top: int, parents: NDArray[np.intp]) -> list[int]:
-    kept = [top]
-    for k in range(top + 1, len(parents)):
-        if parents[k] in kept:
-            kept.append(k)
-    return kept
-
-
-def _from_the_world(
-    top: int, root: Array, position: Array, parents: NDArray[np.intp], local: Array, offsets: Array, scale: Array
-) -> tuple[Array, Array]:
-    """Places of a joint in the world (n, 3), and the local rotations with those above it in its own."""
-    above = [top]
-    while parents[above[-1]] >= 0:
-        above.append(int(parents[above[-1]]))
-    places, turned = root, local[:, above[-1]]
-    for joint in reversed(above[:-1]):
-        step = position if joint == top else np.broadcast_to(scale @ offsets[joint], root.shape)
-        places = places + np.einsum("nij,nj->ni", turned, step)
-        turned = turned @ local[:, joint]
-    changed = local.copy()
-    changed[:, top] = turned
-    return places, changed
 
 
 def _begins_with_rest(angles: Array) -> bool:
@@ -148,41 +118,22 @@ def _begins_with_rest(angles: Array) -> bool:
     return bool(turned[0] > 3.0 * np.median(turned[1:]))
 
 
-def _columns(found: BvhText) -> list[dict[tuple[str, str], Array]]:
-    """The channels of each joint: (axis, kind) to its numbers (n,)."""
-    columns, at = [], 0
-    for joint in found.joints:
-        columns.append({channel: found.table[:, at + k] for k, channel in enumerate(joint.channels)})
-        at += len(joint.channels)
-    return columns
-
-
-def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
-    """Offsets (j, 3), the way of the root (n, 3), and notes; positions of joints stand in place of their offsets."""
-    offsets = np.array([joint.offset for joint in found.joints])
-    columns = _columns(found)
-    size = longest_way(np.array([joint.parent for joint in found.joints]), offsets)
-    notes = []
-    # positions that are zero in every frame are those of a program that adds them to the offsets
-    still = [not any(values.any() for (_, kind), values in each.items() if kind == "position") for each in columns]
+def _mean_offsets(found: BvhText, parents: Indices, offsets: Array) -> list[str]:
+    """Put mean positions of joints in place of their offsets (j, 3); sentences on those that change."""
+    size, notes = longest_way(parents, offsets), []
     for k, joint in enumerate(found.joints[1:], 1):
-        for axis in range(3):
-            values = columns[k].get(("XYZ"[axis], "position"))
-            if values is not None and not still[k]:
-                offsets[k, axis] = values.mean()
-                if np.ptp(values) > 0.01 * size:
-                    notes.append(
-                        f"the length of the bone to {joint.name} changes; its mean is that of the rest posture"
-                    )
-    root = _positions(found, 0)
+        for axis, values in enumerate(found.positions(k).T if found.moves(k) else ()):
+            offsets[k, axis] = values.mean()
+            if np.ptp(values) > 0.01 * size:
+                notes.append(f"the length of the bone to {joint.name} changes; its mean is that of the rest posture")
     offsets[0] = 0.0  # the root's channels are its place in the world
-    return offsets, root, notes
+    return list(dict.fromkeys(notes))
 
 
 def _rotations(found: BvhText) -> tuple[Array, Array]:
     """Angles (n, moving joints, 3), radians, and rotations of all joints in their parents (n, joints, 3, 3)."""
     angles, local = list[Array](), np.tile(np.eye(3), (len(found.table), len(found.joints), 1, 1))
-    for k, (joint, values) in enumerate(zip(found.joints, _columns(found), strict=True)):
+    for k, (joint, values) in enumerate(zip(found.joints, found.columns, strict=True)):
         if joint.channels:
             order = [axis for axis, kind in joint.channels if kind == "rotation"]
             order += [axis for axis in "XYZ" if axis not in order]

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from wholebody.base.arrays import Array
+import numpy as np
+
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.motion.files.base import frame_count, seconds, table
 from wholebody.motion.files.base import number as read_number
@@ -33,6 +36,31 @@ class BvhText:
     table: Array  # (frames, channels) numbers of the motion
     dt: float  # seconds
     notes: tuple[str, ...] = ()  # sentences on what was changed
+
+    @property
+    def parents(self) -> Indices:
+        """(j,) index of each joint's parent; -1 for the root."""
+        return np.array([joint.parent for joint in self.joints], dtype=np.intp)
+
+    @cached_property
+    def columns(self) -> list[dict[tuple[str, str], Array]]:
+        """The channels of each joint: (axis, kind) to its numbers (n,)."""
+        columns, at = [], 0
+        for joint in self.joints:
+            columns.append({channel: self.table[:, at + k] for k, channel in enumerate(joint.channels)})
+            at += len(joint.channels)
+        return columns
+
+    def moves(self, joint: int) -> bool:
+        """Whether a joint has positions; some programs write zeros, which are to be added to the offsets."""
+        return any(values.any() for (_, kind), values in self.columns[joint].items() if kind == "position")
+
+    def positions(self, joint: int) -> Array:
+        """Positions of a joint in its parent (n, 3): its channels, and its offset where it has none."""
+        still, offset, columns = np.zeros(len(self.table)), self.joints[joint].offset, self.columns[joint]
+        return np.stack(
+            [columns.get((axis, "position"), still + at) for axis, at in zip("XYZ", offset, strict=True)], axis=1
+        )
 
 
 def parsed(text: str, name: str) -> BvhText:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +11,17 @@ import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
-from wholebody.base.arrays import Array
-from wholebody.base.errors import FileFormatError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
 from wholebody.geometry.gltf import GltfDocument
+from wholebody.motion.clip import MOST_FRAMES
 from wholebody.motion.files.base import Frames
 from wholebody.motion.files.gltf import JOINT
-from wholebody.motion.files.node_motion import NodeMotion, steps_of
 from wholebody.motion.files.nodes import wrapped
-from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
+from wholebody.motion.structure import limb_pairs, recognised_unit
 
 ENDINGS = (".glb", ".gltf")
 PATHS = ("translation", "rotation", "scale")
@@ -57,7 +59,7 @@ class Animated:
         samplers = animations[chosen]["samplers"]
         channels = [c for c in moving[chosen] if "node" in c["target"]]
         keys = [document.accessor(samplers[c["sampler"]]["input"])[:, 0] for c in channels]
-        times, self.dt, even = steps_of(np.concatenate(keys), self._longest, document.path.name)
+        times, self.dt, even = _steps_of(np.concatenate(keys), self._longest, document.path.name)
         if not even:
             self.notes.append("keyframes are at unequal times or far apart; 60 frames a second are read between them")
         self.count = len(times)
@@ -106,28 +108,46 @@ def skeleton_of(animated: Animated, unit: str | None = None, up: str | None = No
     """
     if animated.dt > 0.1:
         animated = Animated(animated.document.path, 0.1)
-    document = animated.document
+    return animated.document.decoded(lambda: _skeleton(animated, unit, up))
 
-    def read() -> SkeletonMotion:
-        rest = document.worlds({})[0]
-        skins = document.tree.get("skins", [])
-        notes = list(animated.notes)
-        if skins:
-            skin = max(range(len(skins)), key=lambda k: len(skins[k]["joints"]))
-            joints = set(skins[skin]["joints"])
-            bind = _bound(document, skin, rest)
-        else:
-            joints, bind = set(animated.moved), rest
-            notes.append("no body is bound to the nodes; they rest as the file places them")
-        nodes = document.tree["nodes"]
-        for node in document.downwards:  # the ends of limbs, and without a skin what does not turn by itself
-            bare = not {"mesh", "camera"} & nodes[node].keys() and not (skins and nodes[node].get("children"))
-            if bare and document.parents[node] in joints:
-                joints.add(node)
-        motion = NodeMotion(document.names, document.parents, animated.worlds(), bind, animated.dt, tuple(notes))
-        return motion.skeleton(joints, title_of(document.path), unit, up)
 
-    return document.decoded(read)
+def _skeleton(animated: Animated, unit: str | None, up: str | None) -> SkeletonMotion:
+    document, notes = animated.document, list(animated.notes)
+    title, rest, skins = title_of(document.path), document.worlds({})[0], document.tree.get("skins", [])
+    if skins:
+        skin = max(range(len(skins)), key=lambda k: len(skins[k]["joints"]))
+        joints, bind = set(skins[skin]["joints"]), _bound(document, skin, rest)
+    else:
+        joints, bind = set(animated.moved), rest
+        notes.append("no body is bound to the nodes; they rest as the file places them")
+    nodes = document.tree["nodes"]
+    for node in document.downwards:  # the ends of limbs, and without a skin what does not turn by itself
+        bare = not {"mesh", "camera"} & nodes[node].keys() and not (skins and nodes[node].get("children"))
+        if bare and document.parents[node] in joints:
+            joints.add(node)
+    kept = _joined(document.parents, joints)
+    parents = np.array([kept.index(int(document.parents[node])) if at else -1 for at, node in enumerate(kept)])
+    turn, worlds, bind = UP[up or "y"], animated.worlds()[:, kept], bind[kept]
+    bound = _rigid(bind[:, :3, :3])
+    offsets = np.zeros((len(kept), 3))
+    offsets[1:] = bind[1:, :3, 3] - bind[parents[1:], :3, 3]
+    size = longest_way(parents, offsets)
+    if size == 0.0:
+        raise FileFormatError(f"{title}: all joints of the skeleton are at one place")
+    if unit is None:
+        unit = "metres"
+        if limb_pairs(parents, offsets) and not 0.5 < size < 5.0:  # m, from foot to head: exporters forget the unit
+            unit = recognised_unit(parents, offsets)
+            notes += [f"lengths are in {unit}, though the format has metres"] if unit != "metres" else []
+    scale = UNITS[unit]
+    rotations = turn @ (_rigid(worlds[:, :, :3, :3]) @ np.swapaxes(bound, 1, 2)) @ turn.T
+    try:
+        return SkeletonMotion(
+            tuple(document.names[node] for node in kept), parents, scale * offsets @ turn.T, rotations,
+            scale * worlds[:, :, :3, 3] @ turn.T, animated.dt, title, tuple(notes),
+        )  # fmt: skip
+    except InputError as error:
+        raise FileFormatError(f"{title}: {error}") from None
 
 
 def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
@@ -154,6 +174,56 @@ def _bound(document: GltfDocument, skin: int, rest: Array) -> Array:
             above = int(document.parents[node])
             found[node] = found[above] @ np.linalg.solve(rest[above], rest[node])
     return found
+
+
+def _joined(parents: Indices, joints: Collection[int]) -> list[int]:
+    """The nodes, and those between them and the nearest one above all, parents before children."""
+    chains = []
+    for joint in joints:
+        way = [joint]
+        while parents[way[-1]] >= 0:
+            way.append(int(parents[way[-1]]))
+        chains.append(way[::-1])
+    common = 0
+    while len({way[common] if common < len(way) else -1 for way in chains}) == 1 and common < min(map(len, chains)):
+        common += 1
+    if not common:
+        raise FileFormatError("the joints of the skeleton hang on no common node; give each skeleton a file of its own")
+    depth = {node: level for way in chains for level, node in enumerate(way)}
+    return sorted({node for way in chains for node in way[common - 1 :]}, key=lambda node: (depth[node], node))
+
+
+def _rigid(matrices: Array) -> Array:
+    """The rotations (..., 3, 3) nearest to matrices that scale too."""
+    u, _, vt = np.linalg.svd(matrices)
+    sign = np.linalg.det(u @ vt)
+    u[..., :, 2] *= sign[..., None]
+    return np.asarray(u @ vt)
+
+
+def _steps_of(times: Array, longest: float, title: str) -> tuple[Array, float, bool]:
+    """Times of frames, their step, and whether keyframes are at equal steps up to `longest`; otherwise every 1/60 s."""
+    keys = np.unique(np.asarray(times, dtype=float))
+    keys = keys[np.r_[True, np.diff(keys) > 1e-4]]  # s: rounding of single precision
+    if len(keys) < 2:
+        return keys, 1.0 / 30.0, True
+    span, step = float(keys[-1] - keys[0]), float(np.median(np.diff(keys)))
+    count = round(span / step)
+    even = len(keys) > 2 and bool(np.abs((keys - keys[0]) / (span / count) % 1.0 - 0.5).min() > 0.45)
+    even = (even or len(keys) == 2) and step <= longest
+    if not even:
+        count = max(1, round(span * 60.0))
+    if count >= MOST_FRAMES:
+        raise FileFormatError(f"{title}: {count + 1} frames; give at most {MOST_FRAMES}")
+    return np.linspace(keys[0], keys[-1], count + 1), _rounded_step(span / count), even
+
+
+def _rounded_step(dt: float) -> float:
+    """A time step of single precision as it was meant: a whole number of frames a second, or of microseconds."""
+    for meant in (1.0 / max(1, round(1.0 / dt)), round(dt, 6)):
+        if abs(meant - dt) < 1e-6 * dt:
+            return meant
+    return dt
 
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:

@@ -34,7 +34,7 @@ from wholebody.motion.trajectory.program import (
 )
 
 MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
-FAR = 2e-3  # m, rad: with a shortfall no larger, a run that may end early goes on, and a rough run ends
+FAR = 2e-3  # m, rad: with a shortfall no larger, a run that may end early goes on
 
 Cancel = Callable[[int, float], bool]
 """Called with the number of steps and the worst shortfall; true ends the iterations."""
@@ -61,10 +61,9 @@ SETTINGS = SQPSettings()
 
 
 class End(Enum):
-    """Why iterations ended: at an optimum or at their last step, as little was missed, in vain, or by the caller."""
+    """Why iterations ended: at an optimum or at their last step, in vain, or by the caller."""
 
     LAST = "last"
-    ROUGH = "rough"
     EARLY = "early"
     CANCELLED = "cancelled"
 
@@ -155,11 +154,11 @@ class WindowProgram:
 
     def run(
         self, x: Array, cancel: Cancel, radius: float | None = None, largest: float | None = None,
-        early: bool = False, rough: bool = False,
+        early: bool = False,
     ) -> SQPResult:  # fmt: skip
         """Iterate from deviations x (n, nv), in trust regions from `radius` to `largest`.
 
-        `early` ends where much is missed after ten steps, as there are other beginnings; `rough` as soon as little is.
+        `early` ends where much is missed after ten steps, as there are other beginnings.
         """
         here, filter_, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
@@ -171,8 +170,6 @@ class WindowProgram:
                 return SQPResult(here.x, here.objective, here.worst, programs, End.EARLY)
             if cancel(number, here.worst):
                 return SQPResult(here.x, here.objective, here.worst, programs, End.CANCELLED)
-            if rough and number and here.worst <= FAR:
-                return SQPResult(here.x, here.objective, here.worst, programs, End.ROUGH)
             if not counts.any():
                 break
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)

@@ -2,8 +2,7 @@
 
 An attempt solves the window's program, sweeps the motions between frames, adds rows at the places where they dip, and
 goes on from its answer until nothing dips. Attempts begin at the original postures, then on one side of what these
-pass. One whose shortfall stays, or that passes a thing between two frames, is on the wrong side: others are tried
-before it is gone on with.
+pass. One whose shortfall stays is on the wrong side: others are tried before it is gone on with.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import Faults, depths_between, dips
+from wholebody.motion.faults import Faults, dips
 from wholebody.motion.measures import jerk_ratio
-from wholebody.motion.one_side import PASSED, followed, kept_beside
+from wholebody.motion.one_side import followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
-from wholebody.motion.trajectory.program import ONE_STEP, Limits
+from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import FAR, MET, End, WindowProgram
 from wholebody.motion.windows import Window
 
@@ -241,18 +240,9 @@ class ClipRun:
             return own.cancel(count / SETTINGS.iterations)
 
         for number in range(SETTINGS.rounds):
-            # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
-            # before the optimum; from the third round on it is nearly free, and what is missed then seldom is
-            early, rough = way.early and number < 2, way.early and not number
-            found = program.run(x, report, radius, way.largest, early, rough)
+            # from the third round on it is nearly free, and what is missed then seldom is on the wrong side
+            found = program.run(x, report, radius, way.largest, way.early and number < 2)
             work.programs += found.programs
-            if found.end is End.ROUGH:
-                passed = self._passed(own, found.x)
-                if passed > ONE_STEP:  # rows there would push it on
-                    return _Attempt(found.x, found.worst, 0, found.objective, True, program.between)
-                if passed <= PASSED:
-                    found = program.run(found.x, report, radius, way.largest, early)
-                    work.programs += found.programs
             if found.end is End.CANCELLED:
                 return None
             x, radius = found.x, NEARLY
@@ -260,7 +250,7 @@ class ClipRun:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
             near = self._dips(own, x)
             before = len(program.nodes)
-            if found.met or found.end is End.ROUGH:
+            if found.met:
                 program.add(near)
             if len(program.nodes) == before:
                 break
@@ -272,7 +262,3 @@ class ClipRun:
         found = dips(self._run.workspace, own.chart.postures(x), own.moved(x))
         places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
-
-    def _passed(self, own: _Window, x: Array) -> float:
-        """How deep motions between frames with deviations (n, nv) pass through something, metres."""
-        return max(depths_between(self._run.workspace, own.chart.postures(x), own.moved(x)).values(), default=0.0)
