@@ -8,7 +8,7 @@ import pytest
 
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import load
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 from wholebody.figures.tables import table
 
 

@@ -10,7 +10,7 @@ import pytest
 import wholebody as wb
 from wholebody.figures import load
 from wholebody.figures.anthropometry import design_cases, dimension_names, make_person
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 
 CASES = tuple(design_cases())
 
