@@ -85,6 +85,12 @@ class Limits(NamedTuple):
     lower: Array
     upper: Array
 
+    def room(self, q: Array, nv: int) -> tuple[Array, Array]:
+        """Least and greatest displacement (nv,) of a posture q (nq,) within the limits; infinite without one."""
+        least, most = np.full(nv, -np.inf), np.full(nv, np.inf)
+        least[self.idx_v], most[self.idx_v] = self.lower - q[self.idx_q], self.upper - q[self.idx_q]
+        return least, most
+
     def __repr__(self) -> str:
         return brief(self)
 

@@ -22,7 +22,7 @@ from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.postures import stand
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.figures.reduction import drop_rigid_pairs
+from wholebody.figures.self_pairs import drop_rigid_pairs
 from wholebody.figures.tables import named_angles, table
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")

@@ -233,9 +233,8 @@ def urdf_figure(
     )
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
-    robot = Robot(
-        urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual_of_links(model, urdf.visuals)
-    )
+    visual = visual_of_links(model, ((number, *one) for number, one in enumerate(urdf.visuals)))
+    robot = Robot(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual)
     return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples)
 
 

@@ -13,7 +13,7 @@ from wholebody.base.arrays import with_values
 from wholebody.base.checks import color, shown
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import is_file
-from wholebody.figures.link_pieces import LinkShape
+from wholebody.figures.link_pieces import Color, LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_xml, unique_names
 from wholebody.geometry.pieces import LARGEST
@@ -26,7 +26,7 @@ class LinkVisual(NamedTuple):
     """One visual of a link, whose file is absolute; red, green, blue, alpha of its material, None without one."""
 
     shape: LinkShape
-    color: tuple[float, float, float, float] | None
+    color: Color | None
 
 
 class UrdfFile(NamedTuple):
@@ -39,7 +39,7 @@ class UrdfFile(NamedTuple):
     joints: tuple[UrdfJoint, ...]  # in the order of the file
     shapes: tuple[LinkShape, ...]  # collision shapes in the order of the file
     # link to red, green, blue, alpha of the first of its visuals that has a colour
-    colors: dict[str, tuple[float, float, float, float]]
+    colors: dict[str, Color]
     visuals: tuple[LinkVisual, ...]  # what the file wants drawn, without what is wholly transparent or cannot be read
     extension: Element | None  # the element `EXTENSION`, or None
     notes: tuple[str, ...]  # one sentence for each missing part that was filled in
@@ -80,9 +80,9 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     )  # fmt: skip
 
 
-def _paint(robot: Element) -> tuple[dict[Element, tuple[float, float, float, float]], list[str]]:
+def _paint(robot: Element) -> tuple[dict[Element, Color], list[str]]:
     """Colours of visuals, and one sentence on each material that has none; no robot is refused for one."""
-    named: dict[str, tuple[float, float, float, float]] = {}
+    named: dict[str, Color] = {}
     notes = []
     materials = [*robot.findall("material"), *robot.findall("link/visual/material")]
     own = {}
@@ -108,7 +108,7 @@ def _paint(robot: Element) -> tuple[dict[Element, tuple[float, float, float, flo
 
 def _visuals(
     robot: Element,
-    painted: dict[Element, tuple[float, float, float, float]],
+    painted: dict[Element, Color],
     path: Path,
     package_dirs: tuple[Path, ...],
 ) -> Iterator[LinkVisual]:
