@@ -17,8 +17,7 @@ from wholebody.base.pool import Loan, Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all, reduced_parts
-from wholebody.figures.model_archive import reduced
-from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
+from wholebody.figures.model_check import LARGEST, Turning, archived, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
 from wholebody.figures.state import State, free_roots, root_freedoms
 from wholebody.geometry.placement import placement
@@ -30,7 +29,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
     return range(found[0], found[-1] + 1) if found else range(0)
 
 
-copyreg.pickle(pin.Model, reduced)
+copyreg.pickle(pin.Model, archived)
 
 
 class Figure(checks.FixedAttributes):

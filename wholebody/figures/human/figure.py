@@ -15,9 +15,8 @@ from wholebody.figures.anthropometry import Person, make_person
 from wholebody.figures.body_spec import BodySpec, Solid, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
-from wholebody.figures.hand import FINGERS, finger_degrees, finger_pair, is_finger
+from wholebody.figures.hand import FINGERS, finger_angles, finger_degrees, finger_effort, finger_pair, is_finger
 from wholebody.figures.human.details import SPREAD, sphere_names
-from wholebody.figures.human.fingers import finger_angles, finger_effort
 from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.postures import stand

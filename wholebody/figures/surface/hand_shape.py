@@ -11,8 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, PARTS, hand_figure_of, part_radius
-from wholebody.figures.surface.fields import Field, ellipsoid, placed, round_cone, union
-from wholebody.figures.surface.garments import Claim
+from wholebody.figures.surface.fields import Claim, Field, ellipsoid, placed, round_cone, union
 
 
 class HandShape(NamedTuple):

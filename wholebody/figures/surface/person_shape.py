@@ -15,8 +15,11 @@ from wholebody.figures.human.details import SPREAD
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.surface.fields import (
+    Claim,
     Field,
+    Garment,
     ball,
+    bounds,
     ellipsoid,
     grown,
     half_space,
@@ -25,7 +28,6 @@ from wholebody.figures.surface.fields import (
     round_cone,
     union,
 )
-from wholebody.figures.surface.garments import Claim, Garment, bounds
 from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.head_shape import head_shape
 from wholebody.figures.surface.profile import RAYS, caps, limb, piece_field, trunk
