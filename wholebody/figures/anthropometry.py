@@ -320,7 +320,7 @@ class Dimensions:
     def __init__(self, person: Person) -> None:
         self.body = person
         self.stature = height = person.stature
-        toe = self.joint("left_toe_extension")
+        toe = person.origin("left_toe_extension")
         self.toe_joint_x = toe[0]
         self.toe_half_height = person.segment("left_toes", "radius_b") * height
         self.toe_length = person.segment("left_toes", "length") * height
@@ -353,7 +353,7 @@ class Dimensions:
         self.grip = 0.31 * self.hand_length
 
         upward = ("spine1", "spine2", "spine3", "spine4", "neck1", "neck2")
-        above = sum(self.joint(f"{name}_flexion")[2] for name in upward)
+        above = sum(person.origin(f"{name}_flexion")[2] for name in upward)
         self.head_top = height - hip_height - above
         self.head_half_breadth = 0.5 * person.size("head_breadth")
         self.head_half_length = 0.5 * person.size("head_length")
@@ -366,10 +366,6 @@ class Dimensions:
         front = self.head_half_length - self.head_half_breadth
         self.eye_x = self.head_x + front + math.sqrt(max(self.head_half_breadth**2 - below**2, 0.0))
 
-    def joint(self, name: str) -> tuple[float, float, float]:
-        """Position of a joint in its parent segment's frame."""
-        return self.body.origin(name)
-
 
 FINGER_BASES = {
     "thumb": (0.27, 0.13),
@@ -381,13 +377,7 @@ FINGER_BASES = {
 """Knuckles, and the root of the thumb: in hand breadths to the thumb's side, in hand lengths from the wrist.
 They are MyoHand's, as in the table "hand"."""
 
-_HAND_COLUMNS = {
-    "length": "length_frac_of_hand_length",
-    "width": "semi_axis_width_frac_of_hand_breadth",
-    "depth": "semi_axis_depth_frac_of_hand_breadth",
-}
-
 
 def keyed_hand(part: str, quantity: str) -> float:
     """Return "length" (in hand lengths), "width" or "depth" (semi-axes, in hand breadths) of one part of the hand."""
-    return float(keyed("hand")[part][_HAND_COLUMNS[quantity]])
+    return float(keyed("hand")[part][quantity])

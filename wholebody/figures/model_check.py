@@ -51,6 +51,13 @@ def with_joint_frames(model: pin.Model) -> pin.Model:
     return model
 
 
+def along_z(axis: Array) -> Array:
+    """A rotation (3, 3) whose third column is a unit direction."""
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(axis, x), axis))
+
+
 FAR_OUT = 1.0
 """Radians beyond a limit from which a value was probably meant in degrees."""
 

@@ -81,7 +81,7 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     """Thigh with its hip, knee, calf, ankle. On a seat the underside of the thigh is level with the pelvis'."""
     person, radius = size.body, size.body.radius
     thigh, shank = person.length("left_thigh"), person.length("left_shank")
-    high, hip = 0.5 * person.size("thigh_clearance"), size.joint("left_hip_flexion")[1]
+    high, hip = 0.5 * person.size("thigh_clearance"), size.body.origin("left_hip_flexion")[1]
     front, out = high - person.size("seat"), sign * (0.5 * person.size("hip_breadth") - hip - high)
     name = f"{side}_thigh"
 
@@ -116,7 +116,7 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
 
 def clavicle(size: Dimensions, side: str) -> Solid:
     """Shoulder girdle: a level capsule from beside the breastbone to the shoulder joint, as high as the acromion."""
-    x, y, z = size.joint(f"{side}_shoulder_flexion")
+    x, y, z = size.body.origin(f"{side}_shoulder_flexion")
     radius = 0.017 * size.stature  # Radius of the shoulder girdle as a fraction of stature (estimate).
     height = z + size.body.size("shoulder_top") - radius
     return _between(

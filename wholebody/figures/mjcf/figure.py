@@ -16,7 +16,7 @@ from wholebody.base.errors import FileFormatError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Color, Concavity, LinkShape, check_concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
-from wholebody.figures.mjcf.model import RobotModel, robot_model
+from wholebody.figures.mjcf.model import RobotBuilder, RobotModel
 from wholebody.figures.robot_figure import COLOR, Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 
@@ -90,7 +90,7 @@ def mjcf_figure(
     """Return the figure of a robot in a compiled file; arguments and errors as for `xml_figure`."""
     named = None if root in (None, "fixed", "free") else root
     top = compiled.robot(named)
-    robot = robot_model(compiled, top, None if named else root)
+    robot = RobotBuilder(compiled, top, None if named else root).build()
     check_size(robot.model, compiled.path)
     names = compiled.names
     links = tuple(names["body"][body] for body in robot.bodies)
