@@ -21,7 +21,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
 from wholebody.figures.population import SEXES, UNITS, population
 from wholebody.figures.sizes import THUMB_TIP, TRUNK, Skeleton, arm_sizes, leg_sizes
-from wholebody.figures.tables import keyed, named_row, table
+from wholebody.figures.tables import keyed, table
 
 STATURE = Range(1.3, 2.2, "m")
 """The distribution comes from adults of 1.4 to 2.0 m; beyond this range it is invalid."""
@@ -79,7 +79,7 @@ class Person:
 
     def segment(self, name: str, quantity: str) -> float:
         """Return a number of the segment table for this sex, without conversion (mostly a fraction of the stature)."""
-        return float(named_row("segments", name, "segment")[f"{quantity}_{self.column}"])
+        return float(keyed("segments")[name][f"{quantity}_{self.column}"])
 
     def size(self, name: str) -> float:
         """Return a dimension or a size of the body, see `sizes`, metres."""
@@ -129,7 +129,7 @@ class Person:
 
     def _offset(self, joint: str) -> tuple[float, float, float]:
         """The table's position of a joint, metres."""
-        row = named_row("joints", joint, "joint")
+        row = keyed("joints")[joint]
         x, y, z = (float(row[f"o{axis}_{self.column}"]) * self.stature for axis in "xyz")
         return x, y, z
 
@@ -146,7 +146,7 @@ class Person:
 
     def source_length(self, segment: str) -> float:
         """Length [m] of a segment between de Leva's landmarks; these differ most for the thighs of women."""
-        fraction = named_row("segments", segment, "segment")[f"source_length_{self.column}"]
+        fraction = keyed("segments")[segment][f"source_length_{self.column}"]
         return float(fraction) * self.stature if fraction else self.length(segment)
 
     def center_of_mass(self, segment: str) -> Array:

@@ -72,6 +72,7 @@ class PersonShape:
         data = figure.model.createData()
         pin.framesForwardKinematics(figure.model, data, q)
         self.person, self.size = person, Dimensions(person)
+        self._scale = person.stature / 1.75  # lengths below are of a person of 1.75 m
         self.solids: tuple[Solid, ...] = tuple(one for one in spec.solids if not one.name.endswith(f"_thigh:{SPREAD}"))
         self.bind = {name: np.array(data.oMf[figure.frame_id(name)].homogeneous) for name in figure.segments}
         self._marks = {name: np.array(data.oMf[figure.frame_id(name)].translation) for name in figure.frames}
@@ -144,7 +145,7 @@ class PersonShape:
     # ---- garments
 
     def _shirt(self) -> Garment:
-        size, scale = self.size, self.size.stature / 1.75
+        size, scale = self.size, self._scale
         neck = self.at("neck")
         solids = [self._trunk]
         for side, sign in SIDES:
@@ -182,14 +183,14 @@ class PersonShape:
 
     def _trapezius(self, side: str) -> Field:
         """The slope from the side of the neck to the end of the shoulder."""
-        scale, sign = self.size.stature / 1.75, dict(SIDES)[side]
+        scale, sign = self._scale, dict(SIDES)[side]
         high = self.at("neck", np.array([-0.022, sign * 0.024, 0.028]) * scale)
         low = self.at(f"{side}_upper_arm") + np.array([-0.006, -sign * 0.016, 0.004]) * scale
         return round_cone(high, low, 0.036 * scale, 0.034 * scale)
 
     def _armpit(self, side: str) -> list[Field]:
         """Folds before and behind the armpit: from the chest and from the flank to the upper arm."""
-        scale, sign, radius = self.size.stature / 1.75, dict(SIDES)[side], 0.5 * self.person.radius("upper_arm")
+        scale, sign, radius = self._scale, dict(SIDES)[side], 0.5 * self.person.radius("upper_arm")
         folds = []
         for trunk_part, start, ahead in (
             ("thorax", (0.055, sign * 0.080, 0.045), 0.016),
@@ -200,7 +201,7 @@ class PersonShape:
         return folds
 
     def _trousers(self) -> Garment:
-        scale = self.size.stature / 1.75
+        scale = self._scale
         solids = [self._trunk]
         for side, sign in SIDES:
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
@@ -221,7 +222,7 @@ class PersonShape:
         return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _buttock(self, sign: float) -> Field:
-        scale, height = self.size.stature / 1.75, float(self.bind["pelvis"][2, 3])
+        scale, height = self._scale, float(self.bind["pelvis"][2, 3])
         back = self._trunk_ends(height - 0.01 * scale)[0]
         middle = (back + 0.075 * scale, sign * 0.072 * scale, height - 0.030 * scale)
         return ellipsoid(middle, np.array([0.080, 0.078, 0.085]) * scale)
@@ -235,7 +236,7 @@ class PersonShape:
 
     def _head(self) -> Iterator[Garment]:
         shape, frame = head_shape(self.size), self.bind["head"]
-        scale = self.size.stature / 1.75
+        scale = self._scale
         bottom, top = self.at("neck", (0.0, 0.0, -0.04)), self.at("head", (self.size.head_x, 0.0, self.size.head_top))
         radius = 0.98 * self.person.radius("neck")
         throat = self.at("head", (self.size.head_x - 0.030 * scale, 0.0, self.size.head_bottom + 0.06 * scale))
@@ -270,7 +271,7 @@ class PersonShape:
         return Garment(f"{side}_hand", COLORS.skin, placed(shape.field, frame), low, high, 0.0054, claims)
 
     def _shoe(self, side: str, sign: float) -> Garment:
-        size, scale = self.size, self.size.stature / 1.75
+        size, scale = self.size, self._scale
         toe, heel, sole = size.toe_joint_x, size.heel_x, size.sole
         tip, wide = toe + size.toe_length, size.foot_half_width
         ankle = 0.036 * scale
