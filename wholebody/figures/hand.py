@@ -19,7 +19,7 @@ from wholebody.base.checks import choice, known
 from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, describe, keyed_hand, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, ellipsoid, geometry_of, model_of, place
-from wholebody.figures.description import Articulated, Chain, Description, chosen_pairs
+from wholebody.figures.description import Articulated, Chain, Description, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
 from wholebody.figures.tables import keyed, named_angles
@@ -74,9 +74,8 @@ def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)
-    tested, excluded = chosen_pairs(
-        spec.solids, lambda a, b: finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
-    )
+    pieces = (PieceName(solid.name, solid.segment.partition("_")[2]) for solid in spec.solids)
+    tested, excluded = chosen_pairs(pieces, lambda a, b: finger_pair(a.segment, b.segment))
     names = tuple(joint.name for joint in spec.joints)
     groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(

@@ -96,21 +96,19 @@ def mjcf_figure(
     links = tuple(names["body"][body] for body in robot.bodies)
     geoms = [geom for body in robot.bodies for geom in compiled.geoms(body) if compiled.collides(geom)]
     notes = [*compiled.notes, *robot.notes, *_left_out(compiled, robot.bodies)]
-    shapes = []
-    kept = []
+    shapes: dict[int, LinkShape] = {}
     for geom in geoms:
-        shape = geom_shape(compiled, geom)
-        if shape is None:
-            kind = SHAPES[int(compiled.model.geom_type[geom])]
-            notes.append(f"geom {shown(names['geom'][geom])}: a {kind} on a body that moves is not kept")
-        else:
-            shapes.append(shape)
-            kept.append(geom)
+        if (shape := geom_shape(compiled, geom)) is not None:
+            shapes[geom] = shape
+            continue
+        kind = SHAPES[int(compiled.model.geom_type[geom])]
+        notes.append(f"geom {shown(names['geom'][geom])}: a {kind} on a body that moves is not kept")
     if not shapes:
         notes.append("no geom of the robot can touch another one, so nothing of it collides")
     geometry, piece_notes, numbers = geometry_of_links(
-        robot.model, shapes, check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
+        robot.model, shapes.values(), check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
     )
+    kept = list(shapes)
     found = Robot(
         compiled.name, robot.model, links, geometry, (*notes, *piece_notes),
         visual=_visual(compiled, robot),
