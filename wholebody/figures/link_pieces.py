@@ -76,7 +76,7 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
         except EmptyMeshError as error:
             return [], (f"{error}, so it is left out",)
         return [(piece.geometry, piece.placement) for piece in split.pieces], split.notes
-    size, notes = tuple(max(length, SMALLEST) for length in shape.size), ()
+    size, notes = tuple(max(length, SMALLEST) for length in shape.size), tuple[str, ...]()
     if (least := min(shape.size)) < SMALLEST:  # coal is not reliable for less
         notes = (f"its {shape.kind} is {least:.2g} m thin, so it is made {SMALLEST} m thick",)
     if shape.kind != "cylinder":

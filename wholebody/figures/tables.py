@@ -7,13 +7,14 @@ from pathlib import Path
 
 from wholebody.base.files import packaged_table
 
+FOLDER = Path(__file__).parent / "data"
 Row = dict[str, str]
 
 
 @cache
 def table(name: str) -> tuple[Row, ...]:
     """Return the rows of a table in `figures/data`, each a mapping from column to text."""
-    return packaged_table(Path(__file__).parent / "data" / f"{name}.csv")
+    return packaged_table(FOLDER / f"{name}.csv")
 
 
 @cache
