@@ -1,9 +1,9 @@
-"""Signed distances of simple solids, and their smooth union, metres, negative inside; the garments made of them."""
+"""Signed distances of simple solids, and their smooth union; metres, negative inside."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
@@ -117,33 +117,3 @@ def smooth_minimum(a: Array, b: Array, blend: float) -> Array:
         return np.asarray(least)
     near = np.maximum(blend - np.abs(a - b), 0.0) / blend
     return np.asarray(least - near * near * blend * 0.25)
-
-
-class Claim(NamedTuple):
-    """The region of a bone: its influence on a point is exp(-distance / softness)."""
-
-    bone: str  # name of a segment, or "<segment>/half", which turns by half of what the segment turns
-    field: Field  # distance from the region
-    # metres over which the influence fades by e: a larger value bends joints over a longer stretch
-    softness: float = 0.014
-
-
-class Garment(NamedTuple):
-    """A part of one colour, before it is made."""
-
-    # name and color: such as "shirt", and red, green, blue
-    name: str
-    color: tuple[float, float, float]
-    field: Field  # its solid in the world of the body's binding posture
-    # low and high: (3,) corners of a box around it
-    low: Array
-    high: Array
-    cell: float  # size of the grid's cells, metres
-    claims: Sequence[Claim]  # regions of the bones that move it
-    cuts: Sequence[Field] = ()  # half spaces that end it at sharp edges: hem, collar, cuffs
-
-
-def bounds(points: Sequence[Array], margin: float) -> tuple[Array, Array]:
-    """Return the corners of the box around points (3,), `margin` metres larger on every side."""
-    every = np.array(points)
-    return every.min(axis=0) - margin, every.max(axis=0) + margin

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.hand import FINGERS, PARTS
-from wholebody.figures.surface.fields import Claim, Garment, bounds
+from wholebody.figures.surface.garments import Bone, Claim, Garment, Patch, Surface, bounds
 from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.nets import Triangles, coarsened, triangles
 from wholebody.figures.surface.person_shape import COLORS, HALVES, PersonShape
-from wholebody.figures.surface.surface import Bone, Patch, Surface
 
 BONES_EACH = 4
 """Bones that move a vertex: as many as a page's shader takes."""

@@ -15,11 +15,8 @@ from wholebody.figures.human.details import SPREAD
 from wholebody.figures.human.figure import figure_of
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.surface.fields import (
-    Claim,
     Field,
-    Garment,
     ball,
-    bounds,
     ellipsoid,
     grown,
     half_space,
@@ -28,6 +25,7 @@ from wholebody.figures.surface.fields import (
     round_cone,
     union,
 )
+from wholebody.figures.surface.garments import Claim, Garment, bounds
 from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.head_shape import head_shape
 from wholebody.figures.surface.profile import RAYS, caps, limb, piece_field, trunk
@@ -156,14 +154,10 @@ class PersonShape:
                 *self._armpit(side),
             ]
             if size.body.sex == "female":
-                chest = self.at("thorax", (0.0, 0.0, 0.0))
-                front = self._trunk_ends(float(chest[2]) - 0.01 * scale)[1]
-                solids.append(
-                    ellipsoid(
-                        (front - 0.036 * scale, sign * 0.076 * scale, chest[2] - 0.012 * scale),
-                        np.array([0.066, 0.062, 0.062]) * scale,
-                    )
-                )
+                height = float(self.at("thorax")[2])
+                front = self._trunk_ends(height - 0.01 * scale)[1]
+                middle = (front - 0.036 * scale, sign * 0.076 * scale, height - 0.012 * scale)
+                solids.append(ellipsoid(middle, np.array([0.066, 0.062, 0.062]) * scale))
         collar = 1.04 * size.body.radius("neck") + 0.006
         solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
         body = grown(union(solids, 0.035 * scale), 0.006)  # m of cloth
@@ -212,9 +206,8 @@ class PersonShape:
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
             along = (ankle - knee) / np.linalg.norm(ankle - knee)
-            body = union(
-                [body, round_cone(ankle - 0.20 * scale * along, ankle, 0.050 * scale, 0.058 * scale)], 0.06 * scale
-            )
+            leg = round_cone(ankle - 0.20 * scale * along, ankle, 0.050 * scale, 0.058 * scale)
+            body = union([body, leg], 0.06 * scale)
             cuts.append(half_space(ankle + 0.012 * scale * along, along))
         segments = ["pelvis", "lower_lumbar", *self._sided("thigh", "shank")]
         points = [self.at(name) for name in [*segments, *self._sided("foot")]]
@@ -229,10 +222,9 @@ class PersonShape:
 
     def _calf(self, side: str, sign: float) -> Field:
         length, radius = self.person.length("left_shank"), self.person.radius("calf")
-        shape = ellipsoid(
-            (-0.20 * radius, sign * 0.02 * radius, -0.27 * length), (0.90 * radius, 0.90 * radius, 0.24 * length)
-        )
-        return placed(shape, self.bind[f"{side}_shank"])
+        middle = (-0.20 * radius, sign * 0.02 * radius, -0.27 * length)
+        muscle = ellipsoid(middle, (0.90 * radius, 0.90 * radius, 0.24 * length))
+        return placed(muscle, self.bind[f"{side}_shank"])
 
     def _head(self) -> Iterator[Garment]:
         shape, frame = head_shape(self.size), self.bind["head"]
@@ -275,44 +267,30 @@ class PersonShape:
         toe, heel, sole = size.toe_joint_x, size.heel_x, size.sole
         tip, wide = toe + size.toe_length, size.foot_half_width
         ankle = 0.036 * scale
+        above, back, arch = (-0.006, 0.0, -0.02), (heel + 0.034, 0.0, sole + 0.026), (toe, -sign * 0.006, sole + 0.024)
         last = [
-            round_cone((0.0, 0.0, 0.035), (-0.006, 0.0, -0.02), ankle, 0.98 * ankle),
-            round_cone((-0.006, 0.0, -0.02), (heel + 0.036, 0.0, sole + 0.034), 0.98 * ankle, 0.032 * scale),
+            round_cone((0.0, 0.0, 0.035), above, ankle, 0.98 * ankle),
+            round_cone(above, (heel + 0.036, 0.0, sole + 0.034), 0.98 * ankle, 0.032 * scale),
             round_cone((0.0, 0.0, -0.012), (toe - 0.02, sign * 0.003, sole + 0.034), 0.96 * ankle, 0.033 * scale),
-            round_cone(
-                (heel + 0.034, 0.0, sole + 0.026), (toe, -sign * 0.006, sole + 0.024), 0.032 * scale, 0.034 * scale
-            ),
+            round_cone(back, arch, 0.032 * scale, 0.034 * scale),
         ]
-        front = [
-            round_cone(
-                (toe - 0.01, -sign * 0.012, sole + 0.026), (tip - 0.032, sign * -0.012, sole + 0.022), 0.033, 0.026
-            ),
-            round_cone(
-                (toe - 0.012, sign * 0.014, sole + 0.024), (tip - 0.052, sign * 0.016, sole + 0.020), 0.031, 0.024
-            ),
-        ]
-        hind = intersection(
-            ellipsoid((0.5 * (heel + toe), 0.0, sole + 0.006), (0.5 * (toe - heel) + 0.024, 0.80 * wide, 0.05)),
-            half_space((0.0, 0.0, sole + 0.02), (0.0, 0.0, 1.0)),
-            0.006,
-        )
-        fore = intersection(
-            ellipsoid((toe - 0.008, 0.0, sole + 0.006), (tip - toe + 0.006, 0.98 * wide, 0.05)),
-            half_space((0.0, 0.0, sole + 0.018), (0.0, 0.0, 1.0)),
-            0.006,
-        )
+        inner = (toe - 0.01, -sign * 0.012, sole + 0.026), (tip - 0.032, sign * -0.012, sole + 0.022)
+        outer = (toe - 0.012, sign * 0.014, sole + 0.024), (tip - 0.052, sign * 0.016, sole + 0.020)
+        front = [round_cone(*inner, 0.033, 0.026), round_cone(*outer, 0.031, 0.024)]
+        heel_sole = ellipsoid((0.5 * (heel + toe), 0.0, sole + 0.006), (0.5 * (toe - heel) + 0.024, 0.80 * wide, 0.05))
+        hind = intersection(heel_sole, half_space((0.0, 0.0, sole + 0.02), (0.0, 0.0, 1.0)), 0.006)
+        toe_sole = ellipsoid((toe - 0.008, 0.0, sole + 0.006), (tip - toe + 0.006, 0.98 * wide, 0.05))
+        fore = intersection(toe_sole, half_space((0.0, 0.0, sole + 0.018), (0.0, 0.0, 1.0)), 0.006)
         back_field, front_field = union([*last, hind], 0.02), union([*front, fore], 0.012)
-        body = intersection(
-            union([back_field, front_field], 0.02), half_space((0.0, 0.0, sole), (0.0, 0.0, -1.0)), 0.004
-        )
+        floor = half_space((0.0, 0.0, sole), (0.0, 0.0, -1.0))
+        body = intersection(union([back_field, front_field], 0.02), floor, 0.004)
         frame = self.bind[f"{side}_foot"]
         corners = [self.at(f"{side}_foot", (x, y, z)) for x in (heel, tip) for y in (-wide, wide) for z in (sole, 0.04)]
         low, high = bounds(corners, 0.035)
+        before_toes = half_space((toe, 0.0, 0.0), (1.0, 0.0, 0.0))
         claims = [
             Claim(f"{side}_shank", placed(half_space((0.0, 0.0, 0.02), (0.0, 0.0, -1.0)), frame)),
-            Claim(
-                f"{side}_foot", placed(intersection(back_field, half_space((toe, 0.0, 0.0), (1.0, 0.0, 0.0))), frame)
-            ),
+            Claim(f"{side}_foot", placed(intersection(back_field, before_toes), frame)),
             Claim(f"{side}_toes", placed(half_space((toe, 0.0, 0.0), (-1.0, 0.0, 0.0)), frame), 0.010),
         ]
         return Garment(f"{side}_shoe", COLORS.shoes, placed(body, frame), low, high, 0.012, claims)

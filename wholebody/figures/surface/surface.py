@@ -1,4 +1,4 @@
-"""The surface of a figure: patches that bones move (linear blend skinning), made when first needed and kept on disk."""
+"""The surface of a figure, made when it is first needed and kept on disk."""
 
 from __future__ import annotations
 
@@ -6,77 +6,16 @@ import hashlib
 import io
 import json
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import urdf_text
 from wholebody.figures.figure import Figure
 from wholebody.figures.human.spec import human_spec
+from wholebody.figures.surface.garments import Bone, Patch, Surface
 from wholebody.geometry.mesh_cache import cached_entry
-
-
-class Bone(NamedTuple):
-    """What moves vertices."""
-
-    segment: str  # the segment that it moves with; of a half, the segment that it turns half as much as
-    parent: str | None  # of a half, the segment against which the turn is halved; None of others
-    # the segment to move with, rigidly, in a figure that lacks `segment`; None where there is always one
-    instead: str | None
-    bind: Array  # (4, 4) placement in the world in the binding posture
-    rest: Array  # (4, 4) placement relative to `instead` in such a figure
-
-
-class Patch(NamedTuple):
-    """A part of the surface, of which most is moved by the bones of a segment."""
-
-    # name, segment and color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue
-    name: str
-    segment: str
-    color: tuple[float, float, float]
-    # vertices and normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors
-    vertices: Array
-    normals: Array
-    # bones and weights: (n, 4) indices of bones, and their influences, which add up to 1
-    bones: NDArray[np.uint8]
-    weights: Array
-    faces: NDArray[np.int64]  # (m, 3) indices of vertices, wound outwards
-    coarse: NDArray[np.int64]  # (k, 3) the same of fewer and larger triangles, for shadows and small pictures
-
-
-class Surface(NamedTuple):
-    """The surface of a body in its binding posture: what moves it, and patches that share the vertices of borders."""
-
-    bones: tuple[Bone, ...]
-    patches: tuple[Patch, ...]
-
-    def attached(self, figure: Figure, at: Array) -> list[tuple[str, Array]]:
-        """The joint of a figure that carries each bone, and the bone in it (4, 4); some figures lack segments.
-
-        `at` (4, 4) is where the figure's world is, on which those of a fixed root hang.
-        """
-        found = []
-        for bone in self.bones:
-            segment, extra = bone.segment, np.eye(4)
-            if segment not in figure.segments and bone.instead is not None:
-                segment, extra = bone.instead, bone.rest
-            frame = figure.model.frames[figure.frame_id(segment)]
-            offset = np.asarray(frame.placement.homogeneous) @ extra
-            found.append((str(figure.model.names[frame.parentJoint]), offset if frame.parentJoint else at @ offset))
-        return found
-
-    @property
-    def halves(self) -> list[tuple[int, int, int]]:
-        """Bones that turn half way between two others, and are at the origin of the second: numbers of the three."""
-        whole = {bone.segment: number for number, bone in enumerate(self.bones) if bone.parent is None}
-        return [
-            (number, whole[bone.parent], whole[bone.segment])
-            for number, bone in enumerate(self.bones)
-            if bone.parent is not None
-        ]
 
 
 def surface_of(figure: Any) -> Surface | None:
