@@ -72,12 +72,10 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         if top in mine or (top in compiled.robots and not compiled.is_free(top)):
             continue
         if not compiled.is_free(top):
-            places = {0: pin.SE3.Identity()}
-            for body in compiled.tree(top):
-                places[body] = places[int(model.body_parentid[body])] * compiled.place(body)
-                _add_fixed(scene, compiled, body, places[body], left)
+            for body, at in compiled.places(top, pin.SE3.Identity() * compiled.place(top)).items():
+                _add_fixed(scene, compiled, body, at, left)
             continue
-        parts = _parts(compiled, [top, *compiled.tree(top)[1:]], left)
+        parts = _parts(compiled, top, left)
         if parts:
             shape = parts[0][0] if len(parts) == 1 else Compound(tuple(parts))
             at = compiled.place(top) * (parts[0][1] if len(parts) == 1 else pin.SE3.Identity())
@@ -103,19 +101,16 @@ def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left
         scene.add(shape, name=_free_name(scene, name), at=place * at, color=compiled.color(geom))
 
 
-def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[tuple[Shape, pin.SE3]]:
-    """Shapes of bodies that move as one, in the frame of the first."""
-    places = {bodies[0]: pin.SE3.Identity()}
+def _parts(compiled: Compiled, top: int, left: list[str]) -> list[tuple[Shape, pin.SE3]]:
+    """Shapes of a body and those that hang on it, which move as one, in its frame."""
     found = []
-    for body in bodies:
-        if body not in places:
-            places[body] = places[int(compiled.model.body_parentid[body])] * compiled.place(body)
+    for body, place in compiled.places(top, pin.SE3.Identity()).items():
         for geom in filter(compiled.collides, compiled.geoms(body)):
             made = _shape(compiled, geom)
             if made is None or isinstance(made[0], HalfSpace):
                 left.append(compiled.names["geom"][geom])
             else:
-                found.append((made[0], places[body] * made[1]))
+                found.append((made[0], place * made[1]))
     return found
 
 

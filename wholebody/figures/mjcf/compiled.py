@@ -92,6 +92,13 @@ class Compiled:
         """Placement of a body in its parent, before its joints."""
         return placement(self.model.body_pos[body], self.model.body_quat[body])
 
+    def places(self, top: int, at: pin.SE3) -> dict[int, pin.SE3]:
+        """Placements of a body, which is at `at`, and of all that hang on it and do not move."""
+        found = {top: at}
+        for body in self.tree(top)[1:]:
+            found[body] = found[int(self.model.body_parentid[body])] * self.place(body)
+        return found
+
     def is_free(self, body: int) -> bool:
         """Whether a body has a free joint."""
         return any(self.model.jnt_type[joint] == FREE for joint in self.joints(body))
