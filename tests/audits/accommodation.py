@@ -16,7 +16,7 @@ import numpy as np
 
 import wholebody as wb
 from tests.audits.population import people as rows_of
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 
 HIGH = 0.6
 """Height of the seat, metres."""

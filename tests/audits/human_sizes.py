@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 from wholebody.figures.population import population
 
 if TYPE_CHECKING:

@@ -172,7 +172,7 @@ _SIDES = (("left", 1.0), ("right", -1.0))
 
 def _underside(figure: Figure) -> float:
     """Height of the lowest point of pelvis and thighs below the pelvis' frame, thighs level, negative."""
-    from wholebody.figures.measuring import measure
+    from tests.measuring import measure
 
     sizes = measure(figure)
     q = figure.with_joints(figure.neutral, {})

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import wholebody as wb
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 
 JUMP = radians(10.0)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 
 CUSHION, BACK = (wb.Box((0.36, 0.5, 0.04)), (0.18, 0.0, -0.02)), (wb.Box((0.03, 0.5, 0.5)), (-0.015, 0.0, 0.45))
 

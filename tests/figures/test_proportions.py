@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.measuring import measure
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import load
-from wholebody.figures.measuring import measure
 from wholebody.figures.tables import table
 
 

@@ -9,6 +9,7 @@ import trimesh
 
 import wholebody as wb
 from wholebody.geometry.continuous.sweep import Sweep
+from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.proximity import PairTable, Proximity
 from wholebody.scene.moving_obstacles import PER_THING, MovingScene
 
@@ -59,7 +60,7 @@ def test_pieces_and_distances_are_those_of_a_scene_whose_things_were_moved(scene
 def test_pairs_of_things_are_those_of_which_one_moves(scene: wb.Scene) -> None:
     moving = MovingScene(scene.built, ["board", "lamp"])
     own = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
-    pairs = [tuple(pair) for pair in moving.pairs]
+    pairs = [tuple(pair) for pair in pairs_of(moving.geometry)]
     assert pairs[: moving.scene_pairs] == own
     more = pairs[moving.scene_pairs :]
     assert len(set(pairs)) == len(pairs)
@@ -83,14 +84,6 @@ def test_the_centre_goes_straight_and_is_that_of_the_volume(scene: wb.Scene) -> 
         straight = (1.0 - share) * start.act(centroid) + share * end.act(centroid)
         assert place.act(centroid) == pytest.approx(straight, abs=1e-9)
         assert place.rotation == pytest.approx(start.rotation @ pin.exp3(share * turn), abs=1e-9)
-
-
-def test_a_centre_may_be_given(scene: wb.Scene) -> None:
-    moving = MovingScene(scene.built, ["board"], centres={"board": np.array([0.0, 0.3, 0.0])})
-    place = scene.objects["board"].placement
-    at = moving.configuration(scene.figure.posture("standing"), {"board": place})
-    assert at[moving.figure_nq :] == pytest.approx([0.6, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0])
-    assert moving.placement(at, "board").homogeneous == pytest.approx(place.homogeneous)
 
 
 def test_things_that_stay_are_where_they_were_moved_to(scene: wb.Scene) -> None:

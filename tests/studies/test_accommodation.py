@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.figures.measuring import measure
+from tests.measuring import measure
 from wholebody.studies.accommodation import Accommodation
 
 

@@ -4,7 +4,7 @@ from wholebody.figures.adjustable import adjustable
 from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hartenberg
 from wholebody.figures.description import Chain, JointCone, Limits
 from wholebody.figures.figure import Figure
-from wholebody.figures.human.fingers import finger_angles
+from wholebody.figures.hand import finger_angles
 from wholebody.figures.loading import join, load
 from wholebody.figures.packaged_urdf import urdf_path
 from wholebody.figures.reach_cones import ReachCone

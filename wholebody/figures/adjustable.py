@@ -22,7 +22,7 @@ SETTINGS = {
     "height": (pin.JointModelPZ, FARTHEST),
     "tilt": (pin.JointModelRY, np.pi),
 }
-"""Joint and greatest value of each setting, the outermost last."""
+"""Joint and greatest value of each setting."""
 
 ADJUSTABLE = "adjustable"
 """Name of such a figure."""
@@ -59,11 +59,10 @@ def adjustable(
     """
     what = "adjustable: parts"
     checks.instance(parts, Mapping, what, "give {'cushion': (wb.Box((0.45, 0.5, 0.05)), (0.2, 0, 0.4))}")
-    model, last, joints = pin.Model(), 0, []
+    model, last = pin.Model(), 0
     model.name = ADJUSTABLE
-    for name, span in (("slide", slide), ("height", height), ("tilt", tilt)):
-        if span is None:
-            continue
+    spans = {name: span for name, span in zip(SETTINGS, (slide, height, tilt), strict=True) if span is not None}
+    for name, span in spans.items():
         kind, most = SETTINGS[name]
         low, high = checks.numbers(span, (2,), f"adjustable: {name}").tolist()
         if not (-most <= low < high <= most):
@@ -71,8 +70,7 @@ def adjustable(
         none, ends = np.full(1, 1e6), (np.array([low]), np.array([high]))
         last = model.addJoint(last, kind(), pin.SE3.Identity(), name, none, none, *ends)
         model.addJointFrame(last)
-        joints.append(name)
-    if not parts or not joints:
+    if not parts or not spans:
         raise InputError("adjustable takes parts, and slide, height or tilt; add what does not move by scene.add")
     middle = 0.5 * (model.lowerPositionLimit + model.upperPositionLimit)
     pieces, known = [], {}
@@ -90,14 +88,13 @@ def adjustable(
             piece.meshColor[:] = COLOR
             pieces.append(piece)
     description = Description(
-        groups={"all": tuple(joints)},
-        chains={next(iter(parts)): Chain(tuple(joints), next(iter(parts)))},
+        groups={"all": tuple(spans)},
+        chains={next(iter(parts)): Chain(tuple(spans), next(iter(parts)))},
         frames=tuple(parts),
         segments=tuple(parts),
         postures={"middle": partial(copied, q=middle)},
-        effort=dict.fromkeys(joints, 0.0),
+        effort=dict.fromkeys(spans, 0.0),
     )
     figure = Figure(ADJUSTABLE, model, geometry_model(pieces), "own", description)
-    ranges = {"slide": slide, "height": height, "tilt": tilt}
-    figure.loaded_as = ADJUSTABLE, {"parts": known, **{name: span for name, span in ranges.items() if span is not None}}
+    figure.loaded_as = ADJUSTABLE, {"parts": known, **spans}
     return figure

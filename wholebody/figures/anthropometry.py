@@ -21,7 +21,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
 from wholebody.figures.population import SEXES, UNITS, population
 from wholebody.figures.sizes import THUMB_TIP, TRUNK, Skeleton, arm_sizes, leg_sizes
-from wholebody.figures.tables import keyed, named_row, table
+from wholebody.figures.tables import keyed, table
 
 STATURE = Range(1.3, 2.2, "m")
 """The distribution comes from adults of 1.4 to 2.0 m; beyond this range it is invalid."""
@@ -79,7 +79,7 @@ class Person:
 
     def segment(self, name: str, quantity: str) -> float:
         """Return a number of the segment table for this sex, without conversion (mostly a fraction of the stature)."""
-        return float(named_row("segments", name, "segment")[f"{quantity}_{self.column}"])
+        return float(keyed("segments")[name][f"{quantity}_{self.column}"])
 
     def size(self, name: str) -> float:
         """Return a dimension or a size of the body, see `sizes`, metres."""
@@ -129,7 +129,7 @@ class Person:
 
     def _offset(self, joint: str) -> tuple[float, float, float]:
         """The table's position of a joint, metres."""
-        row = named_row("joints", joint, "joint")
+        row = keyed("joints")[joint]
         x, y, z = (float(row[f"o{axis}_{self.column}"]) * self.stature for axis in "xyz")
         return x, y, z
 
@@ -146,7 +146,7 @@ class Person:
 
     def source_length(self, segment: str) -> float:
         """Length [m] of a segment between de Leva's landmarks; these differ most for the thighs of women."""
-        fraction = named_row("segments", segment, "segment")[f"source_length_{self.column}"]
+        fraction = keyed("segments")[segment][f"source_length_{self.column}"]
         return float(fraction) * self.stature if fraction else self.length(segment)
 
     def center_of_mass(self, segment: str) -> Array:
@@ -320,7 +320,7 @@ class Dimensions:
     def __init__(self, person: Person) -> None:
         self.body = person
         self.stature = height = person.stature
-        toe = self.joint("left_toe_extension")
+        toe = person.origin("left_toe_extension")
         self.toe_joint_x = toe[0]
         self.toe_half_height = person.segment("left_toes", "radius_b") * height
         self.toe_length = person.segment("left_toes", "length") * height
@@ -353,7 +353,7 @@ class Dimensions:
         self.grip = 0.31 * self.hand_length
 
         upward = ("spine1", "spine2", "spine3", "spine4", "neck1", "neck2")
-        above = sum(self.joint(f"{name}_flexion")[2] for name in upward)
+        above = sum(person.origin(f"{name}_flexion")[2] for name in upward)
         self.head_top = height - hip_height - above
         self.head_half_breadth = 0.5 * person.size("head_breadth")
         self.head_half_length = 0.5 * person.size("head_length")
@@ -366,10 +366,6 @@ class Dimensions:
         front = self.head_half_length - self.head_half_breadth
         self.eye_x = self.head_x + front + math.sqrt(max(self.head_half_breadth**2 - below**2, 0.0))
 
-    def joint(self, name: str) -> tuple[float, float, float]:
-        """Position of a joint in its parent segment's frame."""
-        return self.body.origin(name)
-
 
 FINGER_BASES = {
     "thumb": (0.27, 0.13),
@@ -381,13 +377,7 @@ FINGER_BASES = {
 """Knuckles, and the root of the thumb: in hand breadths to the thumb's side, in hand lengths from the wrist.
 They are MyoHand's, as in the table "hand"."""
 
-_HAND_COLUMNS = {
-    "length": "length_frac_of_hand_length",
-    "width": "semi_axis_width_frac_of_hand_breadth",
-    "depth": "semi_axis_depth_frac_of_hand_breadth",
-}
-
 
 def keyed_hand(part: str, quantity: str) -> float:
     """Return "length" (in hand lengths), "width" or "depth" (semi-axes, in hand breadths) of one part of the hand."""
-    return float(keyed("hand")[part][_HAND_COLUMNS[quantity]])
+    return float(keyed("hand")[part][quantity])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from itertools import combinations
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -84,6 +84,12 @@ class Limits(NamedTuple):
     idx_v: Indices
     lower: Array
     upper: Array
+
+    def room(self, q: Array, nv: int) -> tuple[Array, Array]:
+        """Least and greatest displacement (nv,) of a posture q (nq,) within the limits; infinite without one."""
+        least, most = np.full(nv, -np.inf), np.full(nv, np.inf)
+        least[self.idx_v], most[self.idx_v] = self.lower - q[self.idx_q], self.upper - q[self.idx_q]
+        return least, most
 
     def __repr__(self) -> str:
         return brief(self)
@@ -178,14 +184,13 @@ class PieceName(NamedTuple):
     segment: str
 
 
-Named = TypeVar("Named", Solid, PieceName)
+Pairs: TypeAlias = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
+"""Pairs that are tested, by name, and those that are not."""
 
 
-def chosen_pairs(
-    solids: Sequence[Named], reason: Callable[[Named, Named], str | None]
-) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
-    """The pairs of pieces that are tested, by name, and those that are not, for which there is a reason."""
-    judged = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
+def chosen_pairs(pieces: Iterable[PieceName], reason: Callable[[PieceName, PieceName], str | None]) -> Pairs:
+    """The pairs of pieces that are tested, and those that are not, for which there is a reason."""
+    judged = [(a.name, b.name, reason(a, b)) for a, b in combinations(pieces, 2)]
     tested = tuple((a, b) for a, b, why in judged if not why)
     return tested, tuple(ExcludedPair(a, b, why) for a, b, why in judged if why)
 

@@ -16,11 +16,9 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Loan, Pool
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
-from wholebody.figures.joining import mounted_parts, posture_of_all
-from wholebody.figures.model_archive import reduced
-from wholebody.figures.model_check import LARGEST, Turning, check_model, with_joint_frames
+from wholebody.figures.joining import mounted_parts, posture_of_all, reduced_parts
+from wholebody.figures.model_check import LARGEST, Turning, archived, check_model, with_joint_frames
 from wholebody.figures.postures import grounded
-from wholebody.figures.reduction import reduced_parts
 from wholebody.figures.state import State, free_roots, root_freedoms
 from wholebody.geometry.placement import placement
 
@@ -31,7 +29,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
     return range(found[0], found[-1] + 1) if found else range(0)
 
 
-copyreg.pickle(pin.Model, reduced)
+copyreg.pickle(pin.Model, archived)
 
 
 class Figure(checks.FixedAttributes):
@@ -311,11 +309,7 @@ class Figure(checks.FixedAttributes):
 
         Infinite without a limit. If q is beyond a limit, both bounds have the sign of the motion back.
         """
-        q = self._checked(q)
-        lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
-        idx_q, idx_v, low, high = self.limits
-        lower[idx_v], upper[idx_v] = low - q[idx_q], high - q[idx_q]
-        return lower, upper
+        return self.limits.room(self._checked(q), self.model.nv)
 
     def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
         """Whether every limited joint is within its limits at q (nq,), to a tolerance in radians or metres."""

@@ -7,17 +7,19 @@ the right. The root of the thumb is fixed at its resting placement, so that the 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import choice, known
 from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, describe, keyed_hand, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, ellipsoid, geometry_of, model_of, place
-from wholebody.figures.description import Articulated, Chain, Description, chosen_pairs
+from wholebody.figures.description import Articulated, Chain, Description, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
 from wholebody.figures.tables import keyed, named_angles
@@ -26,6 +28,7 @@ MESH = "meshes/ellipsoid.obj"
 """The unit polyhedron that the URDF scales to each part."""
 
 FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}
+SIDES = ("left", "right")
 PARTS = {"mc": "metacarpal", "pp": "proximal", "mp": "middle", "dp": "distal"}
 """Key of a part of a finger in the table "hand" to the end of its segment's name."""
 
@@ -39,26 +42,19 @@ def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
         raise InputError(f"side is {side!r}; give 'left' or 'right'")
     person = person or make_person()
     size = Dimensions(person)
-    palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, part_radii(size, "palm")))
-    solids, joints, virtual = [palm], [], []
-    marks = [_palm_mark(size, side)]
-    for finger, parts in FINGERS.items():
-        parent, origin = f"{side}_hand", finger_base(size, side, finger)
-        for part in parts:
-            key, segment = f"{finger}_{part}", f"{side}_{finger}_{PARTS[part]}"
-            for joint in finger_joints(side, finger, key, parent, segment, origin):
-                joints.append(joint)
-                virtual += [Link(joint.child)] if joint.child != segment else []
-            solids.append(Solid(segment, segment, *_polyhedron(size, key), (MESH, part_radii(size, key))))
-            parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
-        marks.append(Landmark(f"{side}_{finger}_tip", parent, origin * pin.SE3(palm_axes(side), np.zeros(3))))
+    parts = tuple(finger_parts(size, side))
+    joints = finger_joints(side, parts)
+    keys = {f"{side}_hand": "palm", **{part.segment: part.key for part in parts}}
     return BodySpec(
         name=f"{side}_hand",
         title=f"{side} hand; {describe(person)}",
-        links=(*massive_links(size, {solid.segment: solid.mesh[1] for solid in solids if solid.mesh}), *virtual),
-        joints=tuple(joints),
-        landmarks=tuple(marks),
-        solids=tuple(solids),
+        links=hand_links(size, side, parts, joints),
+        joints=joints,
+        landmarks=(_palm_mark(size, side), *fingertips(size, side)),
+        solids=tuple(
+            Solid(segment, segment, *_polyhedron(size, key), (MESH, part_radii(size, key)))
+            for segment, key in keys.items()
+        ),
         person=person,
     )
 
@@ -78,9 +74,8 @@ def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)
-    tested, excluded = chosen_pairs(
-        spec.solids, lambda a, b: finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
-    )
+    pieces = (PieceName(solid.name, solid.segment.partition("_")[2]) for solid in spec.solids)
+    tested, excluded = chosen_pairs(pieces, lambda a, b: finger_pair(a.segment, b.segment))
     names = tuple(joint.name for joint in spec.joints)
     groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(
@@ -127,14 +122,39 @@ def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
     return shape, place(z=-radii[2]) * center
 
 
-def finger_base(size: Dimensions, side: str, finger: str) -> pin.SE3:
-    """Placement of a finger's first joint in the hand: its knuckle, or the end of the thumb's resting metacarpal."""
-    if finger == "thumb":
-        return thumb_metacarpal(size, side) * place(z=-keyed_hand("thumb_mc", "length") * size.hand_length)
-    return pin.SE3(np.eye(3), _knuckle(size, finger))
+class FingerPart(NamedTuple):
+    """One part of a finger."""
+
+    finger: str
+    key: str  # of its row in the table "hand"
+    segment: str
+    parent: str  # the segment before it
+    origin: pin.SE3  # of its first joint in that
 
 
-def thumb_metacarpal(size: Dimensions, side: str) -> pin.SE3:
+def finger_parts(size: Dimensions, side: str, *, thumb_root: bool = False) -> Iterator[FingerPart]:
+    """The parts of the fingers of a hand; that of the thumb's metacarpal too if it moves."""
+    for finger, names in FINGERS.items():
+        parent, origin = f"{side}_hand", pin.SE3(np.eye(3), _knuckle(size, finger))
+        if finger == "thumb" and thumb_root:  # it rests where the table has its abduction
+            rest = math.radians(finger_degrees({})["thumb_cmc_abduction"])
+            names, origin = ("mc", *names), _metacarpal(size, side) * place(rotation=pin.utils.rotate("y", rest))
+        elif finger == "thumb":
+            origin = _metacarpal(size, side) * place(z=-keyed_hand("thumb_mc", "length") * size.hand_length)
+        for name in names:
+            key, segment = f"{finger}_{name}", f"{side}_{finger}_{PARTS[name]}"
+            yield FingerPart(finger, key, segment, parent, origin)
+            parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
+
+
+def fingertips(size: Dimensions, side: str) -> Iterator[Landmark]:
+    """The ends of the fingers, with the axes of the palm."""
+    for finger in FINGERS:
+        end = place(z=-keyed_hand(f"{finger}_dp", "length") * size.hand_length, rotation=palm_axes(side))
+        yield Landmark(f"{side}_{finger}_tip", f"{side}_{finger}_distal", end)
+
+
+def _metacarpal(size: Dimensions, side: str) -> pin.SE3:
     """Placement of the resting thumb's metacarpal in the hand, at its joint with the wrist's bones."""
     sign = 1.0 if side == "left" else -1.0
     # Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side (estimate), and out of the
@@ -154,31 +174,35 @@ def _knuckle(size: Dimensions, finger: str) -> Array:
     return np.array([lateral * size.hand_breadth, 0.0, -distal * size.hand_length])
 
 
-def finger_joints(side: str, finger: str, key: str, parent: str, segment: str, origin: pin.SE3) -> Iterator[Joint]:
-    """The joints from the segment before a part of a finger to the part, whose row in the table "hand" is `key`."""
-    sign = 1.0 if side == "left" else -1.0
-    row = keyed("hand")[key]
-    kinds = [kind.strip() for kind in row["joints"].split(",")]
-    ranges = [limits.strip().split("..") for limits in row["limits_deg"].split(";")]
-    for kind, (low, high) in zip(kinds, ranges, strict=True):
-        # Flexion bends towards the palm; abduction leads away from the middle finger, that finger's own to the thumb,
-        # and the thumb's out of the palm.
-        away = 1.0 if finger in ("ring", "little") else -1.0
-        axis = (-sign, 0.0, 0.0) if kind.endswith("flex") else (0.0, away, 0.0)
-        child = segment if kind == kinds[-1] else f"{segment}_v1"
-        limits = math.radians(float(low)), math.radians(float(high))
-        yield Joint(f"{side}_{finger}_{_JOINT[kind]}", parent, child, origin, axis, *limits)
-        parent, origin = child, pin.SE3.Identity()
+def finger_joints(side: str, parts: Iterable[FingerPart]) -> tuple[Joint, ...]:
+    """The joints of the parts of fingers."""
+    sign, found = 1.0 if side == "left" else -1.0, list[Joint]()
+    for finger, key, segment, parent, origin in parts:
+        row = keyed("hand")[key]
+        kinds = [kind.strip() for kind in row["joints"].split(",")]
+        ranges = [limits.strip().split("..") for limits in row["limits_deg"].split(";")]
+        for kind, (low, high) in zip(kinds, ranges, strict=True):
+            # Flexion bends towards the palm; abduction leads away from the middle finger, that finger's own to the
+            # thumb, and the thumb's out of the palm.
+            away = 1.0 if finger in ("ring", "little") else -1.0
+            axis = (-sign, 0.0, 0.0) if kind.endswith("flex") else (0.0, away, 0.0)
+            child = segment if kind == kinds[-1] else f"{segment}_v1"
+            limits = math.radians(float(low)), math.radians(float(high))
+            found.append(Joint(f"{side}_{finger}_{_JOINT[kind]}", parent, child, origin, axis, *limits))
+            parent, origin = child, pin.SE3.Identity()
+    return tuple(found)
 
 
-def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, float]]) -> Iterator[Link]:
-    """Links as solid ellipsoids along -z, of semi-axes `radii` by segment, which share the hand's mass by volume."""
+def hand_links(size: Dimensions, side: str, parts: Iterable[FingerPart], joints: Iterable[Joint]) -> tuple[Link, ...]:
+    """Palm and parts as solid ellipsoids along -z, which share the hand's mass by volume; links between two joints."""
+    radii = {f"{side}_hand": part_radii(size, "palm"), **{part.segment: part_radii(size, part.key) for part in parts}}
     volumes = {segment: math.prod(axes) for segment, axes in radii.items()}
-    total = size.body.segment_mass("left_hand")
+    total, found = size.body.segment_mass("left_hand"), list[Link]()
     for segment, (a, b, c) in radii.items():
         mass = total * volumes[segment] / sum(volumes.values())
         inertia = (mass * (b * b + c * c) / 5.0, mass * (a * a + c * c) / 5.0, mass * (a * a + b * b) / 5.0)
-        yield Link(segment, mass, (0.0, 0.0, -c), inertia)
+        found.append(Link(segment, mass, (0.0, 0.0, -c), inertia))
+    return (*found, *(Link(joint.child) for joint in joints if joint.child not in radii))
 
 
 def is_finger(segment: str) -> bool:
@@ -230,3 +254,51 @@ def finger_degrees(degrees: Mapping[str, float]) -> dict[str, float]:
                 joint = _JOINT[kind.strip()]
                 found[f"{finger}_{joint}"] = degrees.get(f"{finger}_{joint}", degrees.get(joint, float(neutral)))
     return found
+
+
+def finger_effort(joint: str) -> float:
+    """Weight of a finger's joint in a person's effort, beside 1 of an elbow.
+
+    Fitted to typing, where 1.6 for flexion is best; half of it is used, because with more, grasps are found
+    less often. Of the thumb an ESTIMATE: it moves before an arm.
+    """
+    if "thumb" in joint:
+        return 0.2
+    return 0.8 if joint.endswith("flexion") else 0.4
+
+
+def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
+    """Return the angle of every joint of the fingers in a shape of the hand, radians.
+
+    Use it with a person whose hands have fingers: ``figure.with_joints(q, wb.figures.finger_angles("fist", "right"))``.
+
+    Args:
+        shape: "relaxed", "flat", "fist", "hook", "pinch" or "pointing".
+        side: "left" or "right"; both hands if left out.
+
+    Raises:
+        UnknownNameError: another shape.
+        InputError: another side.
+
+    Examples:
+        >>> dexterous = wb.load("human", hands="fingers")
+        >>> fist = dexterous.with_joints(dexterous.neutral, wb.figures.finger_angles("fist", "right"))
+    """
+    shapes = named_angles("fingers")
+    degrees = shapes[known(shape, shapes, "shape of a hand", "finger_angles")]
+    sides = SIDES if side is None else (choice(side, SIDES, "finger_angles: side"),)
+    return {
+        f"{which}_{joint}": math.radians(angle) for which in sides for joint, angle in finger_degrees(degrees).items()
+    }
+
+
+def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
+    """Angles [rad] of fingers from which hands take a bar: no thumb, a fist's, a hook's; nothing without sides."""
+    # Fingers that first bend at their roots touch the bar with their first phalanges before the palm does.
+    hook, fist = ({name: angle for side in sides for name, angle in finger_angles(shape, side).items()}
+                  for shape in ("hook", "fist"))  # fmt: skip
+    fingers = {name: angle for name, angle in hook.items() if "thumb" not in name}
+    if fingers:
+        yield fingers
+        yield fingers | {name: angle for name, angle in fist.items() if "thumb" in name}
+        yield hook

@@ -1,4 +1,4 @@
-"""Several figures as one: side by side in one world, or one mounted on a frame of another."""
+"""Figures made of others: several side by side, one mounted on a frame of another, one with some of its joints."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.errors import InputError
-from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, Member
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, Member, is_root
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
-from wholebody.figures.self_pairs import carriers_above
+from wholebody.figures.self_pairs import carriers_above, drop_rigid_pairs
 from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model, pairs_of
 from wholebody.geometry.proximity import PairTable, Proximity
@@ -267,8 +267,81 @@ def _mounted_posture(made: Articulated, base: Articulated, posture: str, other: 
 def _on_model(model: pin.Model, base: Articulated, posture: str, other: Articulated, prefix: str) -> Array:
     q = pin.neutral(model)
     for figure, own, before in ((base, base.posture(posture), ""), (other, other.neutral, prefix)):
-        for k in range(1, figure.model.njoints):
-            source = figure.model.joints[k]
-            target = model.joints[model.getJointId(before + figure.model.names[k])]
+        _take_values(q, model, figure, own, before)
+    return np.asarray(q)
+
+
+def _take_values(q: Array, model: pin.Model, figure: Articulated, own: Array, prefix: str = "") -> None:
+    """Take the values of a figure's posture `own` into a posture of a model, for the joints that it has."""
+    for k in range(1, figure.model.njoints):
+        name, source = prefix + figure.model.names[k], figure.model.joints[k]
+        if model.existJointName(name):
+            target = model.joints[model.getJointId(name)]
             q[target.idx_q : target.idx_q + target.nq] = own[source.idx_q : source.idx_q + source.nq]
+
+
+def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Parts:
+    """Model, pieces, named parts and what is drawn of a figure of which only some joints move; see `Figure.reduced`."""
+    if not keep:
+        raise InputError("a reduced figure needs at least one joint; name joints, groups or 'root'")
+    model, old = figure.model, figure.describe()
+    kept = {figure.joint_id(name) for name in keep}
+    leads = {int(model.joints[joint].idx_q) for joint in kept}
+    kept |= {joint for joint in range(1, model.njoints) if int(model.joints[joint].idx_q) in leads}
+    locked = [joint for joint in range(1, model.njoints) if joint not in kept]
+    small, (geometry, visual) = pin.buildReducedModel(model, [figure.geometry, figure.visual], locked, q)
+    fixed = drop_rigid_pairs(geometry)
+    names = {name for name in small.names if not is_root(name)}
+    frames = {frame.name: frame for frame in small.frames}
+    efforts = zip(figure.roots.values(), old.root_effort[::2], old.root_effort[1::2], strict=False)
+
+    def moving(joints: Sequence[str]) -> tuple[str, ...]:
+        return tuple(joint for joint in joints if joint in names)
+
+    description = with_values(
+        old,
+        groups={name: left for name, members in old.groups.items() if (left := moving(members))},
+        chains={name: Chain(left, tip) for name, (joints, tip) in old.chains.items() if (left := moving(joints))},
+        postures={name: partial(_restricted, figure, name) for name in old.postures},
+        cones={
+            name: cone
+            for name, cone in old.cones.items()
+            if frames[cone.reference].parentJoint != frames[cone.limb].parentJoint
+        },
+        excluded=(*old.excluded, *fixed),
+        ranges=_ranges(old.ranges, names, figure.joint_values(q), frames),
+        root_effort=tuple(share for joint, *pair in efforts for share in pair if joint in kept),
+        members={},
+    )
+    return small, geometry, description, None if figure.visual is figure.geometry else visual
+
+
+def _ranges(
+    ranges: Mapping[str, MotionRange], kept: set[str], values: Mapping[str, float], frames: Mapping[str, pin.Frame]
+) -> dict[str, MotionRange]:
+    """Ranges of motion of the kept joints; what locked joints share is moved into bounds and offsets."""
+    found: dict[str, MotionRange] = {}
+    for name, part in ranges.items():
+        if isinstance(part, CoupledRange):
+            moving = {joint: factor for joint, factor in part.joints.items() if joint in kept}
+            still = sum(factor * values[joint] for joint, factor in part.joints.items() if joint not in kept)
+            if moving:
+                found[name] = CoupledRange(moving, part.bound - still)
+        elif isinstance(part, EllipticRange):
+            if any(joint in kept for axis in part.axes for joint in axis.joints):
+                axes = []
+                for axis in part.axes:
+                    still = sum(values[joint] for joint in axis.joints if joint not in kept)
+                    moving_joints = tuple(joint for joint in axis.joints if joint in kept)
+                    axes.append(with_values(axis, joints=moving_joints, offset=axis.offset + still))
+                found[name] = EllipticRange(tuple(axes))
+        elif frames[part.reference].parentJoint != frames[part.limb].parentJoint:
+            found[name] = part
+    return found
+
+
+def _restricted(whole: Articulated, name: str, part: Articulated) -> Array:
+    """Posture of the reduced figure: the whole one's values of the remaining joints."""
+    q = pin.neutral(part.model)
+    _take_values(q, part.model, whole, whole.posture(name))
     return np.asarray(q)

@@ -69,7 +69,6 @@ def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
 
 def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:
     """Convex pieces of one shape, in its own frame, and one sentence on each change of the shape."""
-    size, here = shape.size, pin.SE3.Identity()
     if shape.kind in ("mesh", "triangles"):
         share = concavity.get(shape.link) if isinstance(concavity, Mapping) else concavity
         try:
@@ -77,16 +76,14 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
         except EmptyMeshError as error:
             return [], (f"{error}, so it is left out",)
         return [(piece.geometry, piece.placement) for piece in split.pieces], split.notes
-    size, notes = _solid(size, shape.kind)
-    if shape.kind == "box":
-        return [(coal.Box(*size), here)], notes
-    if shape.kind == "sphere":
-        return [(coal.Sphere(size[0]), here)], notes
-    if shape.kind == "ellipsoid":
-        return [(coal.Ellipsoid(*size), here)], notes
-    if shape.kind == "capsule":
-        return [(coal.Capsule(size[0], size[1]), here)], notes
-    piece = hull_piece(_prism(size[0], size[1]), "cylinder")
+    size, notes = tuple(max(length, SMALLEST) for length in shape.size), tuple[str, ...]()
+    if (least := min(shape.size)) < SMALLEST:  # coal is not reliable for less
+        notes = (f"its {shape.kind} is {least:.2g} m thin, so it is made {SMALLEST} m thick",)
+    if shape.kind != "cylinder":
+        return [(getattr(coal, shape.kind.capitalize())(*size), pin.SE3.Identity())], notes
+    ring = around(size[0], CYLINDER_SIDES)
+    corners = [np.column_stack([ring, np.full(CYLINDER_SIDES, z)]) for z in (-0.5 * size[1], 0.5 * size[1])]
+    piece = hull_piece(np.vstack(corners), "cylinder")
     return [(piece.geometry, piece.placement)], notes
 
 
@@ -109,14 +106,6 @@ def triangles_of(mesh: Any) -> tuple[Array, NDArray[np.int64]]:
     """Vertices (n, 3) and faces (m, 3) of coal's mesh."""
     faces = [[mesh.tri_indices(k)[corner] for corner in range(3)] for k in range(mesh.num_tris)]
     return np.array(mesh.vertices(), dtype=float), np.array(faces, dtype=np.int64)
-
-
-def _solid(size: tuple[float, ...], kind: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Sizes for which coal is reliable, and notes on changes."""
-    if min(size) >= SMALLEST:
-        return size, ()
-    note = f"its {kind} is {min(size):.2g} m thin, so it is made {SMALLEST} m thick"
-    return tuple(max(length, SMALLEST) for length in size), (note,)
 
 
 def _of_file(shape: LinkShape, share: float | None) -> ConvexPieces:
@@ -154,12 +143,6 @@ def _pieces(vertices: Array, faces: NDArray[np.int64], share: float | None, what
         return split
     note = f"{what}: its convex pieces ({len(split.pieces)}) have {split.added_volume:.0%} more volume"
     return with_values(split, notes=(*split.notes, note))
-
-
-def _prism(radius: float, length: float) -> Array:
-    """Corners of the prism around a cylinder along z, shape (2 sides, 3)."""
-    ring = around(radius, CYLINDER_SIDES)
-    return np.vstack([np.column_stack([ring, np.full(CYLINDER_SIDES, z)]) for z in (-0.5 * length, 0.5 * length)])
 
 
 MANY = 4000

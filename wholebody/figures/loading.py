@@ -79,20 +79,19 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
     known = [name for name in own if name not in ("path", "who")]
     known += inspect.signature(make_person).parameters if "who" in own else ()
     for option, value in options.items():
+        what = f"{where}: {option}"
         if option not in known:
             raise UnknownNameError("option", option, known, where)
         if option == "srdf" and value is not None:
-            check_file(str(path(value, f"{where}: {option}")), "SRDF")
+            check_file(str(path(value, what)), "SRDF")
         elif option == "package_dirs":
-            folders = (
-                [value] if isinstance(value, (str, PathLike)) else listed(value, f"{where}: {option}", "['share']")
-            )
-            options[option] = [path(folder, f"{where}: {option}") for folder in folders]
+            folders = [value] if isinstance(value, (str, PathLike)) else listed(value, what, "['share']")
+            options[option] = [path(folder, what) for folder in folders]
         elif option in ("detail", "side", "hands") or (option == "root" and value is not None):
-            text(value, f"{where}: {option}")
+            text(value, what)
         elif option == "samples":
             # Most random postures for finding pairs that always overlap: more take minutes.
-            whole(value, f"{where}: {option}", 0, 100_000)
+            whole(value, what, 0, 100_000)
 
 
 def join(figures: Mapping[str, Figure | tuple[Figure, Any]]) -> Figure:

@@ -1,6 +1,8 @@
-"""Numbers of a model that lead to NaN are refused; of angles that were probably meant in degrees a warning says so."""
+"""Models of Pinocchio: checked against impossible numbers and angles in degrees, and pickled."""
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -27,17 +29,15 @@ def check_model(model: pin.Model, name: str) -> None:
                 raise InputError(f"{where}: the {what} of what it carries is not finite; give finite numbers")
         if not (np.isfinite(at.rotation).all() and (np.abs(at.translation) <= LARGEST).all()):
             raise InputError(f"{where}: its origin is not finite or beyond {LARGEST:g} m; give metres")
-    low, high = model.lowerPositionLimit, model.upperPositionLimit
-    wrong = np.flatnonzero(~(low <= high))
-    if len(wrong):
-        joint = next(j for j in model.joints if j.idx_q <= wrong[0] < j.idx_q + j.nq)
-        ends = f"{low[wrong[0]]:g} and {high[wrong[0]]:g}"
-        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its limits are {ends}; give the lower one first")
-    if not (model.velocityLimit >= 0.0).all():
-        wrong = np.flatnonzero(~(model.velocityLimit >= 0.0))
-        joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-        speed = model.velocityLimit[wrong[0]]
-        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
+    low, high, speed = model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit
+    for joint in list(model.joints)[1:]:
+        where = f"{name}, joint {model.names[joint.id]!r}"
+        for k in range(joint.idx_q, joint.idx_q + joint.nq):
+            if not low[k] <= high[k]:
+                raise InputError(f"{where}: its limits are {low[k]:g} and {high[k]:g}; give the lower one first")
+        for k in range(joint.idx_v, joint.idx_v + joint.nv):
+            if not speed[k] >= 0.0:
+                raise InputError(f"{where}: its velocity limit is {speed[k]:g}; give 0 or more")
 
 
 def with_joint_frames(model: pin.Model) -> pin.Model:
@@ -49,6 +49,13 @@ def with_joint_frames(model: pin.Model) -> pin.Model:
     for joint in lacking:
         model.addJointFrame(joint)
     return model
+
+
+def along_z(axis: Array) -> Array:
+    """A rotation (3, 3) whose third column is a unit direction."""
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(axis, x), axis))
 
 
 FAR_OUT = 1.0
@@ -105,3 +112,56 @@ class Turning:
             out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
             return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
         return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"
+
+
+LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
+"""Values of a model that may be infinite: an archive writes them and cannot read them."""
+
+
+class _Follower(NamedTuple):
+    """A joint that follows another one (mimic)."""
+
+    number: int
+    leader: int
+    slope: float
+    offset: float
+    axis: Array  # (6,) it slides along, or turns about, by a unit of its own value
+
+
+def archived(model: pin.Model) -> tuple[Any, ...]:
+    """What a pickled model is made from again, for `copyreg`: Pinocchio's archives lose infinities and followers."""
+    limits = {name: np.array(getattr(model, name)) for name in LIMITS}
+    finite, joints, followers = pin.Model(model), list(model.joints), list[_Follower]()
+    for name, values in limits.items():
+        setattr(finite, name, np.nan_to_num(values))
+    for number, joint in enumerate(joints):
+        if joint.shortname() == "JointModelMimic":
+            law = joint.extract()
+            leader = next(k for k, other in enumerate(joints) if other.nq and other.idx_q == law.idx_q)
+            axis = np.asarray(joint.createData().S, dtype=float).ravel() / law.scaling
+            followers.append(_Follower(number, leader, float(law.scaling), float(law.offset), axis))
+    return _restored, (finite.saveToString(), limits, followers)
+
+
+def _restored(archive: str, limits: dict[str, Array], followers: list[_Follower]) -> pin.Model:
+    """A model that was pickled."""
+    model = pin.Model()
+    model.loadFromString(archive)
+    for name, values in limits.items():
+        setattr(model, name, values)
+    for one in followers:  # archives of Pinocchio 3.8 leave out how many columns of the Jacobian they have
+        joint, leader, read = _along(one.axis), model.joints[one.leader], model.joints[one.number].extract()
+        joint.setIndexes(leader.id, leader.idx_q, leader.idx_v, leader.idx_vExtended)
+        made = pin.JointModelMimic(pin.JointModel(joint), one.slope, one.offset)
+        made.setIndexes(one.number, read.idx_q, read.idx_v, read.idx_vExtended)
+        model.joints[one.number] = pin.JointModel(made)
+    return model
+
+
+def _along(axis: Array) -> Any:
+    """A joint that slides along or turns about an axis (6,)."""
+    kind, direction = ("P", axis[:3]) if axis[:3].any() else ("R", axis[3:])
+    for k, letter in enumerate("XYZ"):
+        if direction[k] == 1.0:
+            return getattr(pin, f"JointModel{kind}{letter}")()
+    return (pin.JointModelPrismaticUnaligned if kind == "P" else pin.JointModelRevoluteUnaligned)(direction)

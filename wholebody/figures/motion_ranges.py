@@ -68,9 +68,9 @@ LARGEST_ELLIPSE = 3
 """Most angles that share one range."""
 
 NECK = (
-    ("flexion", ("neck1_flexion", "neck2_flexion"), -60.0, 50.0),
-    ("lateral", ("neck1_lateral",), -45.0, 45.0),
-    ("rotation", ("neck1_rotation", "neck2_rotation"), -80.0, 80.0),
+    (("neck1_flexion", "neck2_flexion"), -60.0, 50.0),
+    (("neck1_lateral",), -45.0, 45.0),
+    (("neck1_rotation", "neck2_rotation"), -80.0, 80.0),
 )
 """Angles of the neck with the limits of each alone, degrees: extension 60, flexion 50, to a side 45, rotation 80 (AMA,
 AAOS). That they end on an ellipsoid is an ESTIMATE: rotation decreases with flexion and extension (Walmsley et
@@ -88,24 +88,15 @@ def human_ranges(sex: str, joints: Collection[str]) -> dict[str, MotionRange]:
     found: dict[str, MotionRange] = {}
     for side in ("left", "right"):
         for row in table("coupled_ranges"):
-            bound, slope = math.radians(float(row[f"bound_{column}"])), float(row[f"slope_{column}"])
-            found[f"{side}_{row['name']}"] = CoupledRange(
-                {f"{side}_{row['limited']}": 1.0, f"{side}_{row['by']}": -slope}, bound
-            )
+            factors = {f"{side}_{row['limited']}": 1.0, f"{side}_{row['by']}": -float(row[f"slope_{column}"])}
+            if factors.keys() <= set(joints):
+                bound = math.radians(float(row[f"bound_{column}"]))
+                found[f"{side}_{row['name']}"] = CoupledRange(factors, bound)
         found[f"{side}_shoulder_twist"] = shoulder_twist(side)
-    found["neck"] = EllipticRange(
-        tuple(EllipseAxis(names, math.radians(low), math.radians(high)) for _, names, low, high in NECK)
-    )
-    needed = {name: _joints(part) for name, part in found.items()}
-    return {name: part for name, part in found.items() if needed[name] <= set(joints)}
-
-
-def _joints(part: MotionRange) -> set[str]:
-    if isinstance(part, CoupledRange):
-        return set(part.joints)
-    if isinstance(part, EllipticRange):
-        return {name for axis in part.axes for name in axis.joints}
-    return set()
+    if all(set(names) <= set(joints) for names, _, _ in NECK):
+        axes = (EllipseAxis(names, math.radians(low), math.radians(high)) for names, low, high in NECK)
+        found["neck"] = EllipticRange(tuple(axes))
+    return found
 
 
 def shoulder_twist(side: str) -> TwistRange:

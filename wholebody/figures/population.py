@@ -15,12 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.files import packaged_table
+from wholebody.figures.tables import table
 
 SEXES = {"male": "men", "female": "women"}
 
@@ -60,7 +59,7 @@ class Population:
     """
 
     def __init__(self, sex: str) -> None:
-        rows = packaged_table(Path(__file__).parent / "data" / f"population_{sex}.csv")
+        rows = table(f"population_{sex}")
         self.sex = sex
         self.names = tuple(row["name"] for row in rows)
         self.correlation = np.array([[float(row[name]) for name in self.names] for row in rows])

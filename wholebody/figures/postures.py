@@ -117,19 +117,13 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any, 
     """Copy (nq,) of a posture with the root's `height` such that its `segments` stand; see `Figure.grounded`."""
     data = model.createData()
     pin.forwardKinematics(model, data, q)
-    own, around = set(segments), set(scene.objects)
-    pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
-    placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
-    body = [
-        (shape, place, -support(shape, place, np.array((0.0, 0.0, -1.0))))
-        for shape, place, owner in placed
-        if owner in own
-    ]
-    things = [
-        (shape, coal.Transform3s(place.rotation, place.translation))
-        for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)
-        if owner in around and piece.parentJoint == 0
-    ]
+    own, body, things = set(segments), [], []
+    for piece, owner in zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True):
+        place = data.oMi[piece.parentJoint] * piece.placement
+        if owner in own:
+            body.append((piece.geometry, place, -support(piece.geometry, place, np.array((0.0, 0.0, -1.0)))))
+        elif owner in scene.objects and piece.parentJoint == 0:
+            things.append((piece.geometry, coal.Transform3s(place.rotation, place.translation)))
     if not things or not body:
         raise InputError("grounded: there is nothing to stand on; add wb.HalfSpace() to the scene")
     bottom = min(low for *_, low in body)

@@ -7,20 +7,20 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Chain, Description, JointCone, copied
 from wholebody.figures.figure import Figure
-from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
+from wholebody.figures.link_pieces import MANY, Color, Concavity, LinkShape, link_pieces, thinned
 from wholebody.figures.self_pairs import RestPosture, choose_pairs, drop_pairs, rest_posture
-from wholebody.figures.urdf.file import LinkVisual
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import SMALLEST
 
@@ -116,18 +116,21 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
     return chains
 
 
-def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.GeometryModel | None:
-    """Return what is drawn of links, named by link and number; meshes are read when they are drawn."""
+def visual_of_links(
+    model: pin.Model, visuals: Iterable[tuple[int, LinkShape, Color | None]]
+) -> pin.GeometryModel | None:
+    """Return what is drawn of links, named by link and number; mesh files are read when they are drawn."""
     made = []
-    for number, (shape, color) in enumerate(visuals):
+    for number, shape, color in visuals:
         frame_id = model.getFrameId(shape.link, pin.FrameType.BODY)
         frame = model.frames[frame_id]
         solid, file, scale = coal.Sphere(SMALLEST), "", np.ones(3)
         if shape.file is not None:
             file, scale = str(shape.file), np.array(shape.size)
+        elif shape.triangles is not None:
+            solid = _mesh(*(shape.triangles if len(shape.triangles[1]) <= MANY else thinned(*shape.triangles)))
         else:
-            size = [max(length, SMALLEST) for length in shape.size]
-            solid = getattr(coal, shape.kind.capitalize())(*size)
+            solid = getattr(coal, shape.kind.capitalize())(*(max(length, SMALLEST) for length in shape.size))
         paint = np.array(COLOR if color is None else color)
         made.append(
             pin.GeometryObject(
@@ -138,13 +141,22 @@ def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.Geom
     return geometry_model(made) if made else None
 
 
+def _mesh(vertices: Array, faces: NDArray[np.int64]) -> Any:
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(len(faces), len(vertices))
+    mesh.addVertices(np.asarray(vertices, dtype=float))
+    mesh.addTriangles(np.asarray(faces, dtype=np.uint32))
+    mesh.endModel()
+    return mesh
+
+
 def geometry_of_links(
     model: pin.Model,
     shapes: Iterable[LinkShape],
     concavity: Concavity,
     path: Path,
     named: bool = False,
-    colors: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({}),
+    colors: Mapping[str, Color] = MappingProxyType({}),
 ) -> tuple[pin.GeometryModel, tuple[str, ...], tuple[int, ...]]:
     """Return the convex pieces of links, sentences on changes, and the number of the shape of each piece."""
     made, notes, numbers = [], [], []

@@ -69,6 +69,13 @@ def drop_pairs(geometry: pin.GeometryModel, numbers: Iterable[int], reason: str)
     return [ExcludedPair(names[pairs[number][0]], names[pairs[number][1]], reason) for number in sorted(gone)]
 
 
+def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
+    """Remove pairs of pieces on one joint, which never move against each other; return them."""
+    joint = [piece.parentJoint for piece in geometry.geometryObjects]
+    together = [k for k, pair in enumerate(geometry.collisionPairs) if joint[pair.first] == joint[pair.second]]
+    return drop_pairs(geometry, together, "locked together")
+
+
 def random_postures(model: pin.Model, count: int, seed: int) -> Array:
     """Postures (count, nq) within the limits, the root at the origin."""
     rng = np.random.default_rng(seed)
@@ -229,9 +236,7 @@ class _Parting:
         rows = self.state.rows(np.hstack([near.normal, lever]), joint[near.pair[:, 1]], joint[near.pair[:, 0]])
         wanted = 1.5 * APART - near.distance
         free = self.movable.copy()
-        lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
-        lower[self.limits.idx_v] = self.limits.lower - q[self.limits.idx_q]
-        upper[self.limits.idx_v] = self.limits.upper - q[self.limits.idx_q]
+        lower, upper = self.limits.room(q, self.model.nv)
         step = np.zeros(self.model.nv)
         for _ in range(self.model.nv):
             part = rows[:, free]

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-from wholebody.base.errors import UnknownNameError
 from wholebody.base.files import packaged_table
 
 FOLDER = Path(__file__).parent / "data"
-
 Row = dict[str, str]
 
 
 @cache
 def table(name: str) -> tuple[Row, ...]:
     """Return the rows of a table in `figures/data`, each a mapping from column to text."""
-    path = FOLDER / f"{name}.csv"
-    if not path.is_file():
-        raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
-    return packaged_table(path)
+    return packaged_table(FOLDER / f"{name}.csv")
 
 
 @cache
@@ -37,11 +31,3 @@ def named_angles(of: str) -> dict[str, dict[str, float]]:
 def keyed(name: str) -> dict[str, Row]:
     """Return the rows of a table by the text in its column "name"."""
     return {row["name"]: row for row in table(name)}
-
-
-def named_row(name: str, key: str, what: str) -> Mapping[str, str]:
-    """Return the row of a table that has a name in its column "name"."""
-    rows = keyed(name)
-    if key not in rows:
-        raise UnknownNameError(what, key, rows)
-    return rows[key]

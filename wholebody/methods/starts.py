@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.human.fingers import opened_for_a_bar
+from wholebody.figures.hand import opened_for_a_bar
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import allowed

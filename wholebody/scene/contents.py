@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a smaller unit, unless it is a thin floor
+DIVIDE = "divide millimetres by 1000, centimetres by 100"
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
@@ -190,10 +191,10 @@ class SceneContents(checks.FixedAttributes):
             if material is not None:
                 raise InputError(f"{name!r} has a body and a material; give the body's: wb.Body(material=...)")
             mass_properties(checks.instance(shape, Shape, repr(name), SHAPES), body, name)
-        made_of = DEFAULT if material is None else to_material(material, f"{name!r}: material")
-        return self._put(
-            name, shape, at, color, body=body, material=made_of if body is None else body.resolved_material
-        )
+            made_of = body.resolved_material
+        else:
+            made_of = DEFAULT if material is None else to_material(material, f"{name!r}: material")
+        return self._put(name, shape, at, color, body=body, material=made_of)
 
     def attach(
         self,
@@ -225,12 +226,11 @@ class SceneContents(checks.FixedAttributes):
         """
         self.frame_id(to)
         name = self._new_name(name)
-        rests = tuple(checks.listed(rests_on, f"attach {name!r}: rests_on", "['thorax']"))
+        where = f"attach {name!r}: rests_on"
+        rests = tuple(checks.listed(rests_on, where, "['thorax']"))
         carried = [thing.name for thing in self._objects.values() if thing.segment is not None]
         for other in rests:
-            checks.known(
-                other, {*self.figure.segments, *carried}, "segment or carried thing", f"attach {name!r}: rests_on"
-            )
+            checks.known(other, {*self.figure.segments, *carried}, "segment or carried thing", where)
         return self._put(name, shape, at, color, segment=to, rests_on=rests)
 
     def move(self, name: str, *, at: Any, over: float | None = None) -> Self:
@@ -251,11 +251,9 @@ class SceneContents(checks.FixedAttributes):
             thing = self._object(name)
             _warn_of_units(name, place)
             motion = None if seconds is None else Motion(thing.placement, seconds)
-            moved = self._objects[name] = replace(thing, placement=place, motion=motion)
+            self._objects[name] = replace(thing, placement=place, motion=motion)
             if self._built is not None:
-                base = moved.placement
-                if moved.segment is not None:
-                    base = self.model.frames[self.frame_id(moved.segment)].placement * base
+                base = place if thing.segment is None else self.figure.place_of(thing.segment).placement * place
                 self._built.place(name, base, moving=motion is not None)
         return self
 
@@ -275,7 +273,7 @@ class SceneContents(checks.FixedAttributes):
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
             thing = SceneObject(name, shape, place, color=painted, **more)
-            self._objects[self._free_name(name)] = thing
+            self._objects[self._new_name(name)] = thing
             self._changed()
         return self
 
@@ -287,9 +285,7 @@ class SceneContents(checks.FixedAttributes):
         return self._objects[checks.known(name, self._objects, "object")]
 
     def _new_name(self, name: str) -> str:
-        return self._free_name(checks.text(name, "the name of an object"))
-
-    def _free_name(self, name: str) -> str:
+        checks.text(name, "the name of an object")
         if name in self._objects or name in self.figure.segments or name in self.figure.members:
             raise InputError(f"the scene already has {name!r}; give the new object another name, or move() the old one")
         return name
@@ -326,20 +322,12 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
     """Warn of a place and a size that are hardly metres."""
     # m: a thing farther than this from the origin is probably placed in millimetres
     if (far := max(map(abs, place.translation.tolist()))) > 100.0:
-        message = (
-            f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000, centimetres by 100"
-        )
-        checks.warn(message)
+        checks.warn(f"{name!r} is {far:.4g} m away; lengths are in metres, so {DIVIDE}")
     extent = _extent(shape)
     if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:
         size = " x ".join(f"{length:.4g}" for length in extent)
-        correction = (
-            "wb.Mesh(..., scale=0.001) reads millimetres"
-            if isinstance(shape, Mesh)
-            else "divide millimetres by 1000, centimetres by 100"
-        )
-        message = f"{name!r} measures {size} m; lengths are in metres: {correction}"
-        checks.warn(message)
+        correction = "wb.Mesh(..., scale=0.001) reads millimetres" if isinstance(shape, Mesh) else DIVIDE
+        checks.warn(f"{name!r} measures {size} m; lengths are in metres: {correction}")
 
 
 def _extent(shape: Shape | None) -> tuple[float, ...]:

@@ -101,17 +101,10 @@ class SceneGeometry:
         self.number_of = {name: number for number, name in enumerate(pieces_of, start=1)}
         standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
         # those of joined figures, "anna/seat", have numbers below zero: each figure's its own
-        own = {name: -number for number, name in enumerate({owner.partition("/")[0]: 0 for owner in owners})}
-        self.standing = (
-            standing,
-            np.array(
-                [
-                    self.number_of.get(owners[k], own[owners[k].partition("/")[0]] if "/" in owners[k] else 0)
-                    for k in standing
-                ],
-                dtype=np.intp,
-            ),
-        )
+        own = {name: -number for number, name in enumerate(dict.fromkeys(owner.partition("/")[0] for owner in owners))}
+        of_figures = {owner: own[owner.partition("/")[0]] if "/" in owner else 0 for owner in owners}
+        numbers = [(of_figures | self.number_of)[owners[k]] for k in standing]
+        self.standing = standing, np.array(numbers, dtype=np.intp)
         self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`: compile now, not during a solve
         self.lock = Lock()
@@ -188,18 +181,9 @@ class SceneGeometry:
             pieces, table = dict(self.pieces_of), self.table
             return SceneGeometry(self.model, self.geometry.copy(), self.owners, pieces, table.pairs, table.swept)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Return the arguments that it is made from."""
-        return {
-            "model": self.model,
-            "geometry": self.geometry,
-            "owners": self.owners,
-            "pieces_of": self.pieces_of,
-            "pairs": self.table.pairs,
-        }
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(**state)  # type: ignore[misc]
+        return SceneGeometry, (self.model, self.geometry, self.owners, self.pieces_of, self.table.pairs)
 
 
 def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
@@ -216,10 +200,10 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
     body = len(pieces)
     made = {key: shape.pieces() for key, shape in {id(thing.shape): thing.shape for thing in things}.items()}
     for thing in things:
-        frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
-        base = frame.placement * thing.placement if frame is not None else thing.placement
-        joint = frame.parentJoint if frame is not None else 0
-        parent = figure.frame_id(thing.segment) if thing.segment is not None else 0
+        base, joint, parent = thing.placement, 0, 0
+        if thing.segment is not None:
+            parent, joint, place = figure.place_of(thing.segment)
+            base = place * base
         pieces_of[thing.name] = []
         for number, part in enumerate(made[id(thing.shape)]):
             name = f"{thing.name}:{number}"

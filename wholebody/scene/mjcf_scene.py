@@ -15,8 +15,7 @@ from wholebody.base.errors import FileFormatError
 from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
-from wholebody.figures.mjcf.figure import mjcf_figure
-from wholebody.figures.mjcf.geoms import SHAPES, height_field
+from wholebody.figures.mjcf.figure import SHAPES, geom_shape, height_field, mjcf_figure
 from wholebody.geometry.compound import Compound
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
@@ -73,12 +72,10 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         if top in mine or (top in compiled.robots and not compiled.is_free(top)):
             continue
         if not compiled.is_free(top):
-            places = {0: pin.SE3.Identity()}
-            for body in compiled.tree(top):
-                places[body] = places[int(model.body_parentid[body])] * compiled.place(body)
-                _add_fixed(scene, compiled, body, places[body], left)
+            for body, at in compiled.places(top, pin.SE3.Identity() * compiled.place(top)).items():
+                _add_fixed(scene, compiled, body, at, left)
             continue
-        parts = _parts(compiled, [top, *compiled.tree(top)[1:]], left)
+        parts = _parts(compiled, top, left)
         if parts:
             shape = parts[0][0] if len(parts) == 1 else Compound(tuple(parts))
             at = compiled.place(top) * (parts[0][1] if len(parts) == 1 else pin.SE3.Identity())
@@ -99,66 +96,51 @@ def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left
             left.append(compiled.names["geom"][geom])
             continue
         shape, at = found
-        name = compiled.names["body" if body and len(geoms) == 1 else "geom"][
-            body if body and len(geoms) == 1 else geom
-        ]
+        kind, number = ("body", body) if body and len(geoms) == 1 else ("geom", geom)
+        name = compiled.names[kind][number]
         scene.add(shape, name=_free_name(scene, name), at=place * at, color=compiled.color(geom))
 
 
-def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[tuple[Shape, pin.SE3]]:
-    """Shapes of bodies that move as one, in the frame of the first."""
-    places = {bodies[0]: pin.SE3.Identity()}
+def _parts(compiled: Compiled, top: int, left: list[str]) -> list[tuple[Shape, pin.SE3]]:
+    """Shapes of a body and those that hang on it, which move as one, in its frame."""
     found = []
-    for body in bodies:
-        if body not in places:
-            places[body] = places[int(compiled.model.body_parentid[body])] * compiled.place(body)
+    for body, place in compiled.places(top, pin.SE3.Identity()).items():
         for geom in filter(compiled.collides, compiled.geoms(body)):
             made = _shape(compiled, geom)
             if made is None or isinstance(made[0], HalfSpace):
                 left.append(compiled.names["geom"][geom])
             else:
-                found.append((made[0], places[body] * made[1]))
+                found.append((made[0], place * made[1]))
     return found
 
 
 def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
     """A geom's shape, and its placement on its body; None for a height field that is too fine."""
-    model = compiled.model
+    model, known = compiled.model, geom_shape(compiled, geom)
     at = placement(model.geom_pos[geom], model.geom_quat[geom])
-    a, b, c = (float(value) for value in model.geom_size[geom])
-    kind = SHAPES[int(model.geom_type[geom])]
-    if kind == "hfield":
+    if known is not None:
+        return (Mesh(known.triangles) if known.triangles else _solid(known.kind, known.size)), at
+    if SHAPES[int(model.geom_type[geom])] == "hfield":
         prisms = height_field(compiled, geom)
         if len(prisms) > MOST_PRISMS:
             return None
         return Compound(tuple((Hull(prism), pin.SE3.Identity()) for prism in prisms)), at
-    if kind in ("mesh", "sdf"):
-        return Mesh(compiled.mesh(geom)), at
-    shapes: dict[str, Any] = {
-        "plane": HalfSpace,
-        "sphere": lambda: Sphere(a),
-        "capsule": lambda: Capsule(a, 2.0 * b),
-        "cylinder": lambda: Cylinder(a, 2.0 * b),
-        "ellipsoid": lambda: Ellipsoid((a, b, c)),
-        "box": lambda: Box((2.0 * a, 2.0 * b, 2.0 * c)),
-    }
-    return shapes[kind](), at
+    return HalfSpace(), at
+
+
+def _solid(kind: str, size: tuple[float, ...]) -> Shape:
+    shape: Any = {"sphere": Sphere, "capsule": Capsule, "cylinder": Cylinder, "ellipsoid": Ellipsoid, "box": Box}[kind]
+    return shape(size) if kind in ("ellipsoid", "box") else shape(*size)  # type: ignore[no-any-return]
 
 
 def _untested_between(compiled: Compiled, robots: Sequence[int]) -> list[str]:
     """Pairs of bodies of two robots that <exclude> or their contact bits keep from touching."""
-    model, names = compiled.model, compiled.names["body"]
-    excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
-    found = []
+    names, found = compiled.names["body"], []
     for first, second in combinations(robots, 2):
         for one, other in product(compiled.tree(first), compiled.tree(second)):
             pairs = product(*(filter(compiled.collides, compiled.geoms(body)) for body in (one, other)))
-            meet = [
-                (model.geom_contype[a] & model.geom_conaffinity[b])
-                | (model.geom_contype[b] & model.geom_conaffinity[a])
-                for a, b in pairs
-            ]
-            if meet and (frozenset((one, other)) in excluded or not all(meet)):
+            meet = [compiled.meet(*pair) for pair in pairs]
+            if meet and (frozenset((one, other)) in compiled.excluded or not all(meet)):
                 found.append(f"{names[one]} and {names[other]}")
     return found
 

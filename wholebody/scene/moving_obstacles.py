@@ -9,18 +9,19 @@ moves. The figure goes from posture to posture of its path meanwhile.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.checks import known, numbers
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.passing_through import OVERLAP, entered
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
-from wholebody.geometry.large_models import add_pairs, pairs_of
+from wholebody.geometry.large_models import add_pairs
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.geometry_model import SceneGeometry
 
@@ -44,15 +45,8 @@ class MovingScene:
         joints: thing to the joint that carries it.
     """
 
-    def __init__(
-        self,
-        built: SceneGeometry,
-        names: Iterable[str],
-        *,
-        centres: Mapping[str, Array] | None = None,
-        between_things: bool = True,
-    ) -> None:
-        """Add the joints of things that move, about `centres` (3,), by default of their volume."""
+    def __init__(self, built: SceneGeometry, names: Iterable[str], *, between_things: bool = True) -> None:
+        """Add the joints of things that move."""
         self.built, self.names, self.owners = built, tuple(names), built.owners
         for name in self.names:
             known(name, built.pieces_of, "object")
@@ -63,11 +57,9 @@ class MovingScene:
         with built.lock:
             self.geometry = built.geometry.copy()
         self.scene_pairs = len(self.geometry.collisionPairs)
-        self.centres = {name: self._centre(name, centres or {}) for name in self.names}
+        self.centres = {name: self._centre(name) for name in self.names}
         self.joints = {name: self._add_joints(name) for name in self.names}
-        self._still = [
-            (index, name) for name in built.pieces_of if name not in self.joints for index, _ in built.pieces_of[name]
-        ]
+        self._still = [k for name, pieces in built.pieces_of.items() if name not in self.joints for k, _ in pieces]
         if between_things:
             self._add_pairs()
 
@@ -75,7 +67,7 @@ class MovingScene:
         """Put the things that stay to where a geometry model has them, by default the scene's."""
         given = self.built.geometry if geometry is None else geometry
         with self.built.lock:
-            for index, _ in self._still:
+            for index in self._still:
                 self.geometry.geometryObjects[index].placement = given.geometryObjects[index].placement
 
     def configuration(self, q: Array, placements: Mapping[str, pin.SE3]) -> Array:
@@ -92,19 +84,13 @@ class MovingScene:
         rotation = pin.Quaternion(configuration[first + 3 : first + PER_THING]).toRotationMatrix()
         return pin.SE3(rotation, configuration[first : first + 3] - rotation @ self.centres[name])
 
-    @property
-    def pairs(self) -> Indices:
-        """(pairs, 2) the pieces of each pair, the scene's own first."""
-        return pairs_of(self.geometry)
-
-    def _centre(self, name: str, given: Mapping[str, Array]) -> Array:
-        if name in given:
-            return numbers(given[name], (3,), f"{name!r}: centre")
+    def _centre(self, name: str) -> Array:
+        """Of the volume of a thing; the origin of one without end."""
         total, weighted = 0.0, np.zeros(3)
         for index, local in self.built.pieces_of[name]:
             piece = self.geometry.geometryObjects[index].geometry
             volume = float(piece.computeVolume())
-            if not (np.isfinite(volume) and volume > 0.0):  # a half-space
+            if not (np.isfinite(volume) and volume > 0.0):
                 return np.zeros(3)
             total += volume
             weighted += volume * local.act(np.asarray(piece.computeCOM()))
@@ -122,17 +108,14 @@ class MovingScene:
         return int(about)
 
     def _add_pairs(self) -> None:
-        in_world = [
-            name for name, pieces in self.built.pieces_of.items()
-            if self.built.geometry.geometryObjects[pieces[0][0]].parentJoint == 0
-        ]  # fmt: skip
+        pieces_of, pieces = self.built.pieces_of, self.built.geometry.geometryObjects
+        in_world = [name for name, own in pieces_of.items() if pieces[own[0][0]].parentJoint == 0]
         pairs = [
             sorted((i, j))
-            for number, first in enumerate(in_world)
-            for second in in_world[number + 1 :]
+            for first, second in combinations(in_world, 2)
             if first in self.joints or second in self.joints
-            for i, _ in self.built.pieces_of[first]
-            for j, _ in self.built.pieces_of[second]
+            for i, _ in pieces_of[first]
+            for j, _ in pieces_of[second]
         ]
         add_pairs(self.geometry, np.array(pairs, dtype=np.intp).reshape(-1, 2))
 
@@ -215,10 +198,8 @@ class FrameMotion:
         scene = self._scene
         if share in (0.0, 1.0):
             return np.concatenate([q, self._start if share == 0.0 else self._end])
-        at = pin.interpolate(
-            scene.model, np.concatenate([self._both.rest, self._start]), np.concatenate([self._both.rest, self._end]),
-            share,
-        )  # fmt: skip
+        ends = (np.concatenate([self._both.rest, end]) for end in (self._start, self._end))
+        at = pin.interpolate(scene.model, *ends, share)
         return np.concatenate([q, at[scene.figure_nq :]])
 
     def _ways(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> Array:

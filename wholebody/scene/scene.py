@@ -153,5 +153,5 @@ class Scene(SceneContents):
         end = to_placement(way[1], f"moves: {name!r} at the end")
         if thing.segment is None:
             return start, end
-        base = self.model.frames[self.frame_id(thing.segment)].placement
+        base = self.figure.place_of(thing.segment).placement
         return base * start, base * end

@@ -8,9 +8,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.measuring import measure
 from wholebody.figures import load
 from wholebody.figures.anthropometry import design_cases, dimension_names, make_person
-from wholebody.figures.measuring import measure
 
 CASES = tuple(design_cases())
 

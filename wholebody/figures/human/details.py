@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -81,7 +81,7 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     """Thigh with its hip, knee, calf, ankle. On a seat the underside of the thigh is level with the pelvis'."""
     person, radius = size.body, size.body.radius
     thigh, shank = person.length("left_thigh"), person.length("left_shank")
-    high, hip = 0.5 * person.size("thigh_clearance"), size.joint("left_hip_flexion")[1]
+    high, hip = 0.5 * person.size("thigh_clearance"), size.body.origin("left_hip_flexion")[1]
     front, out = high - person.size("seat"), sign * (0.5 * person.size("hip_breadth") - hip - high)
     name = f"{side}_thigh"
 
@@ -116,12 +116,11 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
 
 def clavicle(size: Dimensions, side: str) -> Solid:
     """Shoulder girdle: a level capsule from beside the breastbone to the shoulder joint, as high as the acromion."""
-    x, y, z = size.joint(f"{side}_shoulder_flexion")
+    x, y, z = size.body.origin(f"{side}_shoulder_flexion")
     radius = 0.017 * size.stature  # Radius of the shoulder girdle as a fraction of stature (estimate).
     height = z + size.body.size("shoulder_top") - radius
-    return _between(
-        f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height)
-    )
+    name = f"{side}_clavicle"
+    return _between(name, name, radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height))
 
 
 def hand(size: Dimensions, side: str) -> Iterator[Solid]:
@@ -134,11 +133,8 @@ def hand(size: Dimensions, side: str) -> Iterator[Solid]:
     width = 0.45 * breadth
     fingers = coal.Box(width, 1.8 * index.radius, end - start)
     yield Solid(f"{segment}:1", segment, fingers, place(0.08 * breadth - 0.5 * width, 0.0, -0.5 * (start + end)))
-    radius = index.radius
-    yield _between(
-        f"{segment}:2", segment, radius, (index.x, 0.0, -index.knuckle), (index.x, 0.0, -(index.tip - radius))
-    )
-    thumb = size.thumb
+    tip, thumb = (index.x, 0.0, -(index.tip - index.radius)), size.thumb
+    yield _between(f"{segment}:2", segment, index.radius, (index.x, 0.0, -index.knuckle), tip)
     root = (0.36 * breadth, 0.0, -thumb.knuckle)
     yield _between(f"{segment}:3", segment, thumb.radius, root, (thumb.x, 0.0, -(thumb.tip - thumb.radius)))
 
@@ -147,9 +143,8 @@ def foot(size: Dimensions, side: str) -> Iterator[Solid]:
     """Boxes for the foot and the toes with the shoe's sole, flush below."""
     height, length = -1.0 * size.sole, size.toe_joint_x - size.heel_x
     box = coal.Box(length, 2.0 * size.foot_half_width, height)
-    yield Solid(
-        f"{side}_foot", f"{side}_foot", box, place(0.5 * (size.toe_joint_x + size.heel_x), 0.0, 0.5 * size.sole)
-    )
+    at = place(0.5 * (size.toe_joint_x + size.heel_x), 0.0, 0.5 * size.sole)
+    yield Solid(f"{side}_foot", f"{side}_foot", box, at)
     shoe = size.body.shoes
     toes = coal.Box(size.toe_length, 2.0 * size.foot_half_width, 2.0 * size.toe_half_height + shoe)
     yield Solid(f"{side}_toes", f"{side}_toes", toes, place(0.5 * size.toe_length, 0.0, -0.5 * shoe))
@@ -194,26 +189,20 @@ def _between(
 
 def polyhedra(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
-    rest = [
-        solid
-        for solid in solids(size)
-        if solid.name not in ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
-    ]
-    return (*_trunk_hulls(size), *(hull_of(solid) for solid in rest))
+    trunk = tuple(_trunk_hulls(size))
+    names = {solid.name for solid in trunk}
+    return (*trunk, *(hull_of(solid) for solid in solids(size) if solid.name not in names))
 
 
 def _trunk_hulls(size: Dimensions) -> Iterator[Solid]:
     for part in trunk_slices(size):
         cloth = size.body.clothing
         radii = (part.half_depth + cloth, part.half_breadth + cloth, part.half_height + cloth)
-        yield _solid(part.segment, ellipsoid(radii, part.segment), part.x, part.z)
+        shape, center = ellipsoid(radii, part.segment)
+        yield Solid(part.segment, part.segment, shape, place(part.x, 0.0, part.z) * center)
     neck, length = size.body.radius("neck"), size.body.length("neck")
-    yield _solid("neck", tapered(neck, neck, 0.8 * length, "neck"), 0.0, 0.9 * length)
-
-
-def _solid(name: str, hull: tuple[Any, pin.SE3], x: float, z: float) -> Solid:
-    shape, center = hull
-    return Solid(name, name.partition(":")[0], shape, place(x, 0.0, z) * center)
+    shape, center = tapered(neck, neck, 0.8 * length, "neck")
+    yield Solid("neck", "neck", shape, place(0.0, 0.0, 0.9 * length) * center)
 
 
 def hull_of(solid: Solid) -> Solid:

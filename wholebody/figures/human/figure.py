@@ -12,22 +12,19 @@ import numpy as np
 
 from wholebody.base.arrays import with_values
 from wholebody.figures.anthropometry import Person, make_person
-from wholebody.figures.body_spec import BodySpec, Solid, geometry_of, model_of
-from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone, PieceName, chosen_pairs
+from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
+from wholebody.figures.description import Chain, Description, JointCone, Pairs, PieceName, chosen_pairs
 from wholebody.figures.figure import Figure
-from wholebody.figures.hand import FINGERS, finger_degrees, finger_pair, is_finger
+from wholebody.figures.hand import FINGERS, finger_angles, finger_degrees, finger_effort, finger_pair, is_finger
 from wholebody.figures.human.details import SPREAD, sphere_names
-from wholebody.figures.human.fingers import finger_angles, finger_effort
 from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.postures import stand
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.figures.reduction import drop_rigid_pairs
+from wholebody.figures.self_pairs import drop_rigid_pairs
 from wholebody.figures.tables import named_angles, table
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
-Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
-"""Pairs that are tested, and those that are not."""
 _LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
 _NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
@@ -41,18 +38,20 @@ def human_figure(detail: str = "capsules", hands: str = "rigid", **who: Any) -> 
 def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
     """Return the figure of a human specification, with the ranges of motion and the effort of a person of a sex."""
     model = model_of(spec)
-    tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(spec.solids)
+    pieces = tuple(PieceName(solid.name, solid.segment) for solid in spec.solids)
+    tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(pieces)
     geometry = geometry_of(model, spec.solids, tested)
     rigid = drop_rigid_pairs(geometry)
     joints = {joint.name for joint in spec.joints if joint.axis is not None}
+    groups = human_groups(joints)
     segments = tuple(link.name for link in spec.links if link.mass)
     fingers = [name for name in finger_angles("relaxed") if name in joints]
     held = finger_degrees({}) if fingers else {}
     # Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.
     # ESTIMATE: without it a person bows and walks away before an arm is lifted.
     description = Description(
-        groups=human_groups(joints),
-        chains=human_chains(joints),
+        groups=groups,
+        chains=human_chains(groups),
         frames=tuple(mark.name for mark in spec.landmarks),
         segments=segments,
         postures={name: partial(stand, degrees={**held, **own}) for name, own in named_angles("human").items()},
@@ -92,9 +91,8 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     return {name: members for name, members in groups.items() if members}
 
 
-def human_chains(joints: set[str]) -> dict[str, Chain]:
+def human_chains(groups: Mapping[str, tuple[str, ...]]) -> dict[str, Chain]:
     """Return the limbs from the root outwards, with their tips."""
-    groups = human_groups(joints)
     tips = {"spine": "thorax", "neck": "head_top"}
     for limb, tip in (("arm", "index_tip"), ("leg", "toe_tip")):
         tips |= {f"{side}_{limb}": f"{side}_{tip}" for side in ("left", "right")}
@@ -138,28 +136,24 @@ def avatar_figure(detail: str = "capsules", **who: Any) -> Figure:
     return figure_of(avatar_spec(make_person(**who), detail), detail)
 
 
-def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
-    """Return tested and excluded pairs of the capsules' and hulls' pieces."""
-    return _pairs_of(tuple(PieceName(solid.name, solid.segment) for solid in solids))
-
-
 @lru_cache(maxsize=8)  # people differ in their sizes alone
-def _pairs_of(parts: tuple[PieceName, ...]) -> Pairs:
-    return chosen_pairs(parts, lambda a, b: _reason(a, b) or _reason(b, a))
+def body_pairs(pieces: tuple[PieceName, ...]) -> Pairs:
+    """Return tested and excluded pairs of the capsules' and hulls' pieces."""
+    return chosen_pairs(pieces, lambda a, b: _reason(a, b) or _reason(b, a))
 
 
-def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
+def sphere_pairs(pieces: tuple[PieceName, ...]) -> Pairs:
     """Return tested and excluded pairs of the 39 spheres: across the five groups only, without the named exclusions."""
     names = sphere_names()
     group = {names[row["name"]]: row["group"] for row in table("spheres39")}
     named = {frozenset((names[row["a"]], names[row["b"]])) for row in table("sphere_exclusions")}
 
-    def reason(a: Solid, b: Solid) -> str | None:
+    def reason(a: PieceName, b: PieceName) -> str | None:
         if group[a.name] == group[b.name]:
             return "same group of spheres"
         return "limbs meet the trunk" if frozenset((a.name, b.name)) in named else None
 
-    return chosen_pairs(solids, reason)
+    return chosen_pairs(pieces, reason)
 
 
 def _reason(a: PieceName, b: PieceName) -> str | None:

@@ -8,16 +8,31 @@ direction means the same on both sides: flexion, abduction, inward rotation, ele
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+
+import coal
 
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
-from wholebody.figures.anthropometry import Dimensions, Person, describe, make_person
+from wholebody.figures.anthropometry import FINGER_BASES, Dimensions, Person, describe, keyed_hand, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
-from wholebody.figures.hand import palm_axes
-from wholebody.figures.human import details, fingers
+from wholebody.figures.hand import (
+    SIDES,
+    FingerPart,
+    finger_joints,
+    finger_parts,
+    fingertips,
+    hand_links,
+    palm_axes,
+    part_radius,
+)
+from wholebody.figures.human import details
 from wholebody.figures.sizes import MIDDLE_TIP
 from wholebody.figures.tables import keyed, table
+
+HANDS = ("rigid", "fingers")
+"""What a person's hands can be: one segment each, or palms with fingers of twenty joints a hand, see `figures.hand`."""
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": details.spheres,
@@ -29,7 +44,7 @@ DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
 def human_spec(person: Person | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
     """Return the specification of a person, or of the median man; arguments and errors as for `wholebody.load`."""
     person = person or make_person()
-    known(hands, fingers.HANDS, "kind of hands", "human")
+    known(hands, HANDS, "kind of hands", "human")
     if hands == "fingers" and detail == "spheres":
         raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
     spec = BodySpec(
@@ -41,7 +56,38 @@ def human_spec(person: Person | None = None, detail: str = "capsules", hands: st
         solids=human_solids(person, detail),
         person=person,
     )
-    return fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
+    return _with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
+
+
+def _with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
+    """The specification with fingers, in "capsules" or "hulls", in the place of hands of one segment."""
+    hands = tuple(f"{side}_hand" for side in SIDES)
+    links = [link for link in spec.links if link.name not in hands]
+    joints, marks = list(spec.joints), {mark.name: mark for mark in spec.landmarks}
+    solids = [solid for solid in spec.solids if solid.segment not in hands]
+    for side in SIDES:
+        parts = tuple(finger_parts(size, side, thumb_root=True))
+        added = finger_joints(side, parts)
+        joints += added
+        links += hand_links(size, side, parts, added)
+        marks |= {mark.name: mark for mark in fingertips(size, side)}
+        made = _finger_solids(size, side, parts)
+        solids += map(details.hull_of, made) if detail == "hulls" else made
+    return replace(
+        spec, links=tuple(links), joints=tuple(joints), landmarks=tuple(marks.values()), solids=tuple(solids)
+    )
+
+
+def _finger_solids(size: Dimensions, side: str, parts: Iterable[FingerPart]) -> Iterator[Solid]:
+    """The palm up to the knuckles as a box, each part of a finger as a capsule that ends at the fingertip."""
+    palm = FINGER_BASES["middle"][1] * size.hand_length + 0.5 * part_radius(size, "middle_pp")
+    box = coal.Box(size.hand_breadth, 2.0 * size.palm_half_thickness, palm)
+    yield Solid(f"{side}_hand:0", f"{side}_hand", box, place(z=-0.5 * palm))
+    for part in parts:
+        length, radius = keyed_hand(part.key, "length") * size.hand_length, part_radius(size, part.key)
+        start = 0.3 * length if part.key == "thumb_mc" else 0.0
+        end = length - radius if part.key.endswith("_dp") else length
+        yield Solid(part.segment, part.segment, coal.Capsule(radius, end - start), place(z=-0.5 * (start + end)))
 
 
 def human_solids(person: Person, detail: str) -> tuple[Solid, ...]:
@@ -129,12 +175,12 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
             Landmark(f"{side}_thumb_tip", f"{side}_hand", place(thumb.x, 0.0, -thumb.tip, palm)),
             Landmark(f"{side}_middle_tip", f"{side}_hand", place(0.0, 0.0, -MIDDLE_TIP * size.hand_length, palm)),
             Landmark(f"{side}_grip", f"{side}_hand", place(0.0, -sign * (thick + 0.0175), -size.grip, palm)),
-            Landmark(f"{side}_shoulder", f"{side}_clavicle", place(*size.joint(f"{side}_shoulder_flexion"))),
-            Landmark(f"{side}_elbow", f"{side}_upper_arm", place(*size.joint(f"{side}_elbow_flexion"))),
-            Landmark(f"{side}_wrist", f"{side}_forearm", place(*size.joint(f"{side}_wrist_flexion"))),
-            Landmark(f"{side}_hip", "pelvis", place(*size.joint(f"{side}_hip_flexion"))),
-            Landmark(f"{side}_knee", f"{side}_thigh", place(*size.joint(f"{side}_knee_flexion"))),
-            Landmark(f"{side}_ankle", f"{side}_shank", place(*size.joint(f"{side}_ankle_dorsiflexion"))),
+            Landmark(f"{side}_shoulder", f"{side}_clavicle", place(*size.body.origin(f"{side}_shoulder_flexion"))),
+            Landmark(f"{side}_elbow", f"{side}_upper_arm", place(*size.body.origin(f"{side}_elbow_flexion"))),
+            Landmark(f"{side}_wrist", f"{side}_forearm", place(*size.body.origin(f"{side}_wrist_flexion"))),
+            Landmark(f"{side}_hip", "pelvis", place(*size.body.origin(f"{side}_hip_flexion"))),
+            Landmark(f"{side}_knee", f"{side}_thigh", place(*size.body.origin(f"{side}_knee_flexion"))),
+            Landmark(f"{side}_ankle", f"{side}_shank", place(*size.body.origin(f"{side}_ankle_dorsiflexion"))),
             Landmark(f"{side}_heel", f"{side}_foot", place(size.heel_x, 0.0, size.sole)),
             Landmark(f"{side}_sole", f"{side}_foot", place(0.5 * (size.heel_x + size.toe_joint_x), 0.0, size.sole)),
             Landmark(f"{side}_ball", f"{side}_foot", place(size.toe_joint_x, 0.0, size.sole)),

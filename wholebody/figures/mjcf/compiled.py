@@ -82,12 +82,22 @@ class Compiled:
 
     def joints(self, body: int) -> range:
         """Joints between a body and its parent, from the parent outwards."""
-        first = int(self.model.body_jntadr[body])
-        return range(first, first + int(self.model.body_jntnum[body])) if first >= 0 else range(0)
+        return _run(self.model.body_jntadr[body], self.model.body_jntnum[body])
+
+    def geoms(self, body: int) -> range:
+        """Geoms of a body."""
+        return _run(self.model.body_geomadr[body], self.model.body_geomnum[body])
 
     def place(self, body: int) -> pin.SE3:
         """Placement of a body in its parent, before its joints."""
         return placement(self.model.body_pos[body], self.model.body_quat[body])
+
+    def places(self, top: int, at: pin.SE3) -> dict[int, pin.SE3]:
+        """Placements of a body, which is at `at`, and of all that hang on it and do not move."""
+        found = {top: at}
+        for body in self.tree(top)[1:]:
+            found[body] = found[int(self.model.body_parentid[body])] * self.place(body)
+        return found
 
     def is_free(self, body: int) -> bool:
         """Whether a body has a free joint."""
@@ -144,6 +154,16 @@ class Compiled:
         ends = zip(self.model.pair_geom1.tolist(), self.model.pair_geom2.tolist(), strict=True)
         return frozenset(frozenset(pair) for pair in ends)
 
+    @cached_property
+    def excluded(self) -> frozenset[frozenset[int]]:
+        """Pairs of bodies that the file excludes (<exclude>)."""
+        return frozenset(frozenset((value >> 16, value & 0xFFFF)) for value in map(int, self.model.exclude_signature))
+
+    def meet(self, first: int, second: int) -> bool:
+        """Whether the contact bits of two geoms let them touch."""
+        types, affinities = self.model.geom_contype, self.model.geom_conaffinity
+        return bool((types[first] & affinities[second]) | (types[second] & affinities[first]))
+
     def color(self, geom: int) -> tuple[float, float, float, float] | None:
         """A geom's own colour, else that of its material times the mean of its texture; None without both."""
         model, material = self.model, int(self.model.geom_matid[geom])
@@ -161,10 +181,10 @@ class Compiled:
         red, green, blue, alpha = (float(value) for value in color)
         return red, green, blue, alpha
 
-    def geoms(self, body: int) -> range:
-        """Geoms of a body."""
-        first = int(self.model.body_geomadr[body])
-        return range(first, first + int(self.model.body_geomnum[body])) if first >= 0 else range(0)
+
+def _run(first: Any, count: Any) -> range:
+    """Numbers of what belongs to a body; MuJoCo's first one is -1 where there is nothing."""
+    return range(int(first), int(first) + int(count)) if first >= 0 else range(0)
 
 
 def placement(position: Array, quaternion: Array) -> pin.SE3:

@@ -1,8 +1,9 @@
-"""A figure from an MJCF file, as MuJoCo compiles it."""
+"""A figure from an MJCF file, as MuJoCo compiles it; shapes of its geoms, height fields as convex prisms."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
 from os import PathLike
 from pathlib import Path
 
@@ -13,12 +14,60 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
 from wholebody.figures.figure import Figure
-from wholebody.figures.link_pieces import Concavity, check_concavity
-from wholebody.figures.mjcf.compiled import Compiled, is_mjcf
-from wholebody.figures.mjcf.geoms import SHAPES, geom_shape, visual_of
-from wholebody.figures.mjcf.model import RobotModel, robot_model
-from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure
+from wholebody.figures.link_pieces import Color, Concavity, LinkShape, check_concavity
+from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
+from wholebody.figures.mjcf.model import RobotBuilder, RobotModel
+from wholebody.figures.robot_figure import COLOR, Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
+
+SHAPES = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
+"""Kinds of geoms, as MuJoCo numbers them."""
+
+
+def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:
+    """The shape of a geom on its body; None for planes and height fields, which only the world has."""
+    model = compiled.model
+    link = compiled.names["body"][int(model.geom_bodyid[geom])]
+    at = placement(model.geom_pos[geom], model.geom_quat[geom])
+    size = [float(value) for value in model.geom_size[geom]]
+    kind = SHAPES[int(model.geom_type[geom])]
+    if kind in ("mesh", "sdf"):
+        return LinkShape(link, at, "triangles", (), triangles=compiled.mesh(geom))
+    sizes: dict[str, tuple[float, ...]] = {
+        "sphere": (size[0],), "capsule": (size[0], 2.0 * size[1]), "cylinder": (size[0], 2.0 * size[1]),
+        "ellipsoid": tuple(size), "box": tuple(2.0 * value for value in size),
+    }  # fmt: skip
+    return LinkShape(link, at, kind, sizes[kind]) if kind in sizes else None
+
+
+def height_field(compiled: Compiled, geom: int) -> list[Array]:
+    """Corners (n, 3) of the convex prisms of a geom's height field, in its frame, below the triangles MuJoCo tests."""
+    model, field = compiled.model, int(compiled.model.geom_dataid[geom])
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    half_x, half_y, top, below = (float(value) for value in model.hfield_size[field])
+    first = int(model.hfield_adr[field])
+    heights = top * np.array(model.hfield_data[first : first + rows * columns], dtype=float).reshape(rows, columns)
+    if not np.isfinite(heights).all():
+        row, column = np.argwhere(~np.isfinite(heights))[0]
+        raise FileFormatError(
+            f"{compiled.path}: a height field has {heights[row, column]} in row {row}, column {column}; give finite "
+            "heights"
+        )
+    x, y = np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows)
+    grid = np.stack([*np.meshgrid(x, y), heights], axis=2)
+    bend = heights[:-1, :-1] - heights[:-1, 1:] - heights[1:, :-1] + heights[1:, 1:]
+    found, flat = [], 1e-9  # m: a cell whose four corners are nearer than this to one plane is one prism
+    for row in range(rows - 1):
+        slopes = np.stack([np.diff(heights[row]), heights[row + 1, :-1] - heights[row, :-1]], axis=1)
+        planes = [tuple(np.round(slope, 12)) for slope in slopes]
+        for column in np.flatnonzero(np.abs(bend[row]) >= flat):
+            planes[column] = ("bent", int(column))
+        for plane, cells in groupby(range(columns - 1), planes.__getitem__):
+            run = list(cells)
+            (a, b), (c, d) = grid[row : row + 2, [run[0], run[-1] + 1]]
+            tops = [(a, d, c), (a, b, d)] if plane[0] == "bent" else [(a, b, c, d)]
+            found += [np.concatenate([top, [(x, y, -below) for x, y, _ in top]]) for top in tops]
+    return found
 
 
 def xml_figure(
@@ -41,30 +90,28 @@ def mjcf_figure(
     """Return the figure of a robot in a compiled file; arguments and errors as for `xml_figure`."""
     named = None if root in (None, "fixed", "free") else root
     top = compiled.robot(named)
-    robot = robot_model(compiled, top, None if named else root)
+    robot = RobotBuilder(compiled, top, None if named else root).build()
     check_size(robot.model, compiled.path)
     names = compiled.names
     links = tuple(names["body"][body] for body in robot.bodies)
     geoms = [geom for body in robot.bodies for geom in compiled.geoms(body) if compiled.collides(geom)]
     notes = [*compiled.notes, *robot.notes, *_left_out(compiled, robot.bodies)]
-    shapes = []
-    kept = []
+    shapes: dict[int, LinkShape] = {}
     for geom in geoms:
-        shape = geom_shape(compiled, geom)
-        if shape is None:
-            kind = SHAPES[int(compiled.model.geom_type[geom])]
-            notes.append(f"geom {shown(names['geom'][geom])}: a {kind} on a body that moves is not kept")
-        else:
-            shapes.append(shape)
-            kept.append(geom)
+        if (shape := geom_shape(compiled, geom)) is not None:
+            shapes[geom] = shape
+            continue
+        kind = SHAPES[int(compiled.model.geom_type[geom])]
+        notes.append(f"geom {shown(names['geom'][geom])}: a {kind} on a body that moves is not kept")
     if not shapes:
         notes.append("no geom of the robot can touch another one, so nothing of it collides")
     geometry, piece_notes, numbers = geometry_of_links(
-        robot.model, shapes, check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
+        robot.model, shapes.values(), check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
     )
+    kept = list(shapes)
     found = Robot(
         compiled.name, robot.model, links, geometry, (*notes, *piece_notes),
-        visual=visual_of(compiled, robot),
+        visual=_visual(compiled, robot),
         frames=robot.sites,
         postures=_postures(compiled, robot),
         cones=robot.cones,
@@ -74,7 +121,23 @@ def mjcf_figure(
     return robot_figure(found, samples)
 
 
-def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, tuple[float, float, float, float]]:
+def _visual(compiled: Compiled, robot: RobotModel) -> pin.GeometryModel | None:
+    """The geoms that are drawn, meshes as they are and not their hulls; None where these are the pieces of contacts."""
+    groups = 3  # of geoms that MuJoCo's viewer shows by itself; the others are for contacts
+    shapes = [
+        (geom, shape, color)
+        for body in robot.bodies
+        for geom in compiled.geoms(body)
+        if compiled.model.geom_group[geom] < groups
+        and ((color := compiled.color(geom)) or COLOR)[3] > 0.0
+        and (shape := geom_shape(compiled, geom)) is not None
+    ]
+    if not any(shape.kind == "triangles" or not compiled.collides(geom) for geom, shape, _ in shapes):
+        return None
+    return visual_of_links(robot.model, shapes)
+
+
+def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, Color]:
     """The colour of a body's first geom that has one."""
     found = {}
     for body in robot.bodies:
@@ -96,18 +159,15 @@ def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
 
 def _untested(compiled: Compiled, geoms: Sequence[int]) -> Callable[[int, int], str | None]:
     """Why two pieces, which belong to these geoms, are never tested: contact bits or <exclude>, and no <pair>."""
-    model = compiled.model
-    types, affinities = np.array(model.geom_contype[geoms]), np.array(model.geom_conaffinity[geoms])
-    bodies = np.array(model.geom_bodyid[geoms])
-    excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in map(int, model.exclude_signature)}
 
     def reason(first: int, second: int) -> str | None:
-        if frozenset((geoms[first], geoms[second])) in compiled.pairs:
+        pair = geoms[first], geoms[second]
+        if frozenset(pair) in compiled.pairs:
             return None
-        if not (types[first] & affinities[second]) | (types[second] & affinities[first]):
+        if not compiled.meet(*pair):
             return "their contact bits do not meet"
-        pair = frozenset((int(bodies[first]), int(bodies[second])))
-        return "the file excludes them" if pair in excluded else None
+        bodies = frozenset(int(compiled.model.geom_bodyid[geom]) for geom in pair)
+        return "the file excludes them" if bodies in compiled.excluded else None
 
     return reason
 

@@ -16,6 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.figures.description import ROOT_JOINT, JointCone
 from wholebody.figures.mjcf.compiled import BALL, FREE, HINGE, SLIDE, Compiled, placement
+from wholebody.figures.model_check import along_z
 from wholebody.figures.reach_cones import ReachCone
 
 
@@ -55,13 +56,8 @@ class RobotModel(NamedTuple):
         return q
 
 
-def robot_model(compiled: Compiled, top: int, root: str | None) -> RobotModel:
-    """Build the model of the robot whose body on the world is `top`; its root is "fixed", "free", or as in the file."""
-    return _Builder(compiled, top, root).build()
-
-
-class _Builder:
-    """One robot while it is built."""
+class RobotBuilder:
+    """Builds the model of the robot on the body `top`; its root is "fixed", "free", or None: as in the file."""
 
     def __init__(self, compiled: Compiled, top: int, root: str | None) -> None:
         self._file, self._top, self._root = compiled, top, root
@@ -72,6 +68,7 @@ class _Builder:
         self._laws = self._followers()
 
     def build(self) -> RobotModel:
+        """Build it, once."""
         theirs, file, model = self._file.model, self._file, self._model
         model.name = file.name
         at: dict[int, tuple[int, pin.SE3]] = {0: (0, pin.SE3.Identity())}
@@ -116,23 +113,21 @@ class _Builder:
     def _add(self, joint: int, kind: int, axis: Array, parent: int, place: pin.SE3) -> tuple[int, pin.SE3]:
         """Add a joint; the frame in which the rest is placed, in the joint's own."""
         name, theirs = self._file.names["joint"][joint], self._file.model
-        law = self._laws.get(joint)
+        law, letter, turned = self._laws.get(joint), "Z", pin.SE3(along_z(axis), np.zeros(3))
+        if law is None and 1.0 in axis and all(each.leader != joint for each in self._laws.values()):
+            letter, turned = "XYZ"[int(np.argmax(axis))], pin.SE3.Identity()
         if kind == BALL:
-            made = self._model.addJoint(parent, pin.JointModelSpherical(), place, name)
-            self._joints[joint] = made
-            return made, pin.SE3.Identity()
-        solid = pin.SE3(_along_z(axis), np.zeros(3))
-        if law is not None:  # a follower has the axis of its leader in its own frame: z
+            model, turned = pin.JointModelSpherical(), pin.SE3.Identity()
+        elif law is not None:  # a follower has the axis of its leader in its own frame: z
             leader = self._model.joints[self._joints[law.leader]]
-            follower = pin.JointModelMimic(leader, law.slope, law.offset)
-            made = self._model.addJoint(parent, follower, place * solid, name)
-            self._joints[joint] = made
-            return made, solid.inverse()
-        model, turned = _aligned(axis, slide=kind == SLIDE)
-        if any(each.leader == joint for each in self._laws.values()):
-            model, turned = pin.JointModelPZ() if kind == SLIDE else pin.JointModelRZ(), solid
-        made = self._model.addJoint(parent, model, place * turned, name)
-        self._joints[joint] = made
+            model = pin.JointModelMimic(leader, law.slope, law.offset)
+        else:
+            model = getattr(pin, f"JointModel{'P' if kind == SLIDE else 'R'}{letter}")()
+        made = self._joints[joint] = self._model.addJoint(parent, model, place * turned, name)
+        if kind == BALL:
+            return made, turned
+        if law is not None:
+            return made, turned.inverse()
         slot, dof = self._model.joints[made].idx_q, self._model.joints[made].idx_v
         low, high = self._range(joint)
         for end, value in (("lower", low), ("upper", high)) if kind == HINGE else ():
@@ -248,7 +243,7 @@ class _Builder:
             if angle >= np.pi:
                 continue
             round_it = np.arange(16) * (2.0 * np.pi / 16)
-            frame = _along_z(limb)
+            frame = along_z(limb)
             corners = np.column_stack(
                 (np.sin(angle) * np.cos(round_it), np.sin(angle) * np.sin(round_it), np.full(16, np.cos(angle)))
             )
@@ -268,23 +263,3 @@ def _inertia(theirs: Any, body: int) -> pin.Inertia:
     turn = placement(np.zeros(3), theirs.body_iquat[body]).rotation
     about = turn @ np.diag(theirs.body_inertia[body]) @ turn.T
     return pin.Inertia(float(theirs.body_mass[body]), np.array(theirs.body_ipos[body]), about)
-
-
-def _aligned(axis: Array, *, slide: bool) -> tuple[pin.JointModel, pin.SE3]:
-    """A joint about or along the coordinate axis that `axis` is, otherwise about z of a frame that is turned there."""
-    kinds = (
-        (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ) if slide
-        else (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-    )  # fmt: skip
-    for k in range(3):
-        if axis[k] == 1.0:
-            return kinds[k](), pin.SE3.Identity()
-    return kinds[2](), pin.SE3(_along_z(axis), np.zeros(3))
-
-
-def _along_z(axis: Array) -> Array:
-    """A rotation whose third column is a unit direction."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(helper, axis)
-    x /= np.linalg.norm(x)
-    return np.column_stack((x, np.cross(axis, x), axis))

@@ -105,13 +105,10 @@ def _palm(size: Dimensions, sign: float) -> Field:
     rays = []
     for finger in ("index", "middle", "ring", "little"):
         lateral, distal = FINGER_BASES[finger]
-        knuckle = (lateral * breadth, 0.0, -distal * length)
-        rays.append(
-            round_cone((0.55 * lateral * breadth, 0.0, -0.03 * length), knuckle, 0.155 * breadth, 0.135 * breadth)
-        )
-    heel = ellipsoid(
-        (-0.24 * breadth, -sign * 0.03 * breadth, -0.19 * length), (0.17 * breadth, 0.155 * breadth, 0.17 * length)
-    )
+        root, knuckle = (0.55 * lateral * breadth, 0.0, -0.03 * length), (lateral * breadth, 0.0, -distal * length)
+        rays.append(round_cone(root, knuckle, 0.155 * breadth, 0.135 * breadth))
+    middle = (-0.24 * breadth, -sign * 0.03 * breadth, -0.19 * length)
+    heel = ellipsoid(middle, (0.17 * breadth, 0.155 * breadth, 0.17 * length))
     return union([union(rays, 0.008), heel], 0.010)
 
 

@@ -70,6 +70,7 @@ class PersonShape:
         data = figure.model.createData()
         pin.framesForwardKinematics(figure.model, data, q)
         self.person, self.size = person, Dimensions(person)
+        self._scale = person.stature / 1.75  # lengths below are of a person of 1.75 m
         self.solids: tuple[Solid, ...] = tuple(one for one in spec.solids if not one.name.endswith(f"_thigh:{SPREAD}"))
         self.bind = {name: np.array(data.oMf[figure.frame_id(name)].homogeneous) for name in figure.segments}
         self._marks = {name: np.array(data.oMf[figure.frame_id(name)].translation) for name in figure.frames}
@@ -142,7 +143,7 @@ class PersonShape:
     # ---- garments
 
     def _shirt(self) -> Garment:
-        size, scale = self.size, self.size.stature / 1.75
+        size, scale = self.size, self._scale
         neck = self.at("neck")
         solids = [self._trunk]
         for side, sign in SIDES:
@@ -153,14 +154,10 @@ class PersonShape:
                 *self._armpit(side),
             ]
             if size.body.sex == "female":
-                chest = self.at("thorax", (0.0, 0.0, 0.0))
-                front = self._trunk_ends(float(chest[2]) - 0.01 * scale)[1]
-                solids.append(
-                    ellipsoid(
-                        (front - 0.036 * scale, sign * 0.076 * scale, chest[2] - 0.012 * scale),
-                        np.array([0.066, 0.062, 0.062]) * scale,
-                    )
-                )
+                height = float(self.at("thorax")[2])
+                front = self._trunk_ends(height - 0.01 * scale)[1]
+                middle = (front - 0.036 * scale, sign * 0.076 * scale, height - 0.012 * scale)
+                solids.append(ellipsoid(middle, np.array([0.066, 0.062, 0.062]) * scale))
         collar = 1.04 * size.body.radius("neck") + 0.006
         solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
         body = grown(union(solids, 0.035 * scale), 0.006)  # m of cloth
@@ -180,14 +177,14 @@ class PersonShape:
 
     def _trapezius(self, side: str) -> Field:
         """The slope from the side of the neck to the end of the shoulder."""
-        scale, sign = self.size.stature / 1.75, dict(SIDES)[side]
+        scale, sign = self._scale, dict(SIDES)[side]
         high = self.at("neck", np.array([-0.022, sign * 0.024, 0.028]) * scale)
         low = self.at(f"{side}_upper_arm") + np.array([-0.006, -sign * 0.016, 0.004]) * scale
         return round_cone(high, low, 0.036 * scale, 0.034 * scale)
 
     def _armpit(self, side: str) -> list[Field]:
         """Folds before and behind the armpit: from the chest and from the flank to the upper arm."""
-        scale, sign, radius = self.size.stature / 1.75, dict(SIDES)[side], 0.5 * self.person.radius("upper_arm")
+        scale, sign, radius = self._scale, dict(SIDES)[side], 0.5 * self.person.radius("upper_arm")
         folds = []
         for trunk_part, start, ahead in (
             ("thorax", (0.055, sign * 0.080, 0.045), 0.016),
@@ -198,7 +195,7 @@ class PersonShape:
         return folds
 
     def _trousers(self) -> Garment:
-        scale = self.size.stature / 1.75
+        scale = self._scale
         solids = [self._trunk]
         for side, sign in SIDES:
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
@@ -209,9 +206,8 @@ class PersonShape:
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
             along = (ankle - knee) / np.linalg.norm(ankle - knee)
-            body = union(
-                [body, round_cone(ankle - 0.20 * scale * along, ankle, 0.050 * scale, 0.058 * scale)], 0.06 * scale
-            )
+            leg = round_cone(ankle - 0.20 * scale * along, ankle, 0.050 * scale, 0.058 * scale)
+            body = union([body, leg], 0.06 * scale)
             cuts.append(half_space(ankle + 0.012 * scale * along, along))
         segments = ["pelvis", "lower_lumbar", *self._sided("thigh", "shank")]
         points = [self.at(name) for name in [*segments, *self._sided("foot")]]
@@ -219,21 +215,20 @@ class PersonShape:
         return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _buttock(self, sign: float) -> Field:
-        scale, height = self.size.stature / 1.75, float(self.bind["pelvis"][2, 3])
+        scale, height = self._scale, float(self.bind["pelvis"][2, 3])
         back = self._trunk_ends(height - 0.01 * scale)[0]
         middle = (back + 0.075 * scale, sign * 0.072 * scale, height - 0.030 * scale)
         return ellipsoid(middle, np.array([0.080, 0.078, 0.085]) * scale)
 
     def _calf(self, side: str, sign: float) -> Field:
         length, radius = self.person.length("left_shank"), self.person.radius("calf")
-        shape = ellipsoid(
-            (-0.20 * radius, sign * 0.02 * radius, -0.27 * length), (0.90 * radius, 0.90 * radius, 0.24 * length)
-        )
-        return placed(shape, self.bind[f"{side}_shank"])
+        middle = (-0.20 * radius, sign * 0.02 * radius, -0.27 * length)
+        muscle = ellipsoid(middle, (0.90 * radius, 0.90 * radius, 0.24 * length))
+        return placed(muscle, self.bind[f"{side}_shank"])
 
     def _head(self) -> Iterator[Garment]:
         shape, frame = head_shape(self.size), self.bind["head"]
-        scale = self.size.stature / 1.75
+        scale = self._scale
         bottom, top = self.at("neck", (0.0, 0.0, -0.04)), self.at("head", (self.size.head_x, 0.0, self.size.head_top))
         radius = 0.98 * self.person.radius("neck")
         throat = self.at("head", (self.size.head_x - 0.030 * scale, 0.0, self.size.head_bottom + 0.06 * scale))
@@ -268,48 +263,34 @@ class PersonShape:
         return Garment(f"{side}_hand", COLORS.skin, placed(shape.field, frame), low, high, 0.0054, claims)
 
     def _shoe(self, side: str, sign: float) -> Garment:
-        size, scale = self.size, self.size.stature / 1.75
+        size, scale = self.size, self._scale
         toe, heel, sole = size.toe_joint_x, size.heel_x, size.sole
         tip, wide = toe + size.toe_length, size.foot_half_width
         ankle = 0.036 * scale
+        above, back, arch = (-0.006, 0.0, -0.02), (heel + 0.034, 0.0, sole + 0.026), (toe, -sign * 0.006, sole + 0.024)
         last = [
-            round_cone((0.0, 0.0, 0.035), (-0.006, 0.0, -0.02), ankle, 0.98 * ankle),
-            round_cone((-0.006, 0.0, -0.02), (heel + 0.036, 0.0, sole + 0.034), 0.98 * ankle, 0.032 * scale),
+            round_cone((0.0, 0.0, 0.035), above, ankle, 0.98 * ankle),
+            round_cone(above, (heel + 0.036, 0.0, sole + 0.034), 0.98 * ankle, 0.032 * scale),
             round_cone((0.0, 0.0, -0.012), (toe - 0.02, sign * 0.003, sole + 0.034), 0.96 * ankle, 0.033 * scale),
-            round_cone(
-                (heel + 0.034, 0.0, sole + 0.026), (toe, -sign * 0.006, sole + 0.024), 0.032 * scale, 0.034 * scale
-            ),
+            round_cone(back, arch, 0.032 * scale, 0.034 * scale),
         ]
-        front = [
-            round_cone(
-                (toe - 0.01, -sign * 0.012, sole + 0.026), (tip - 0.032, sign * -0.012, sole + 0.022), 0.033, 0.026
-            ),
-            round_cone(
-                (toe - 0.012, sign * 0.014, sole + 0.024), (tip - 0.052, sign * 0.016, sole + 0.020), 0.031, 0.024
-            ),
-        ]
-        hind = intersection(
-            ellipsoid((0.5 * (heel + toe), 0.0, sole + 0.006), (0.5 * (toe - heel) + 0.024, 0.80 * wide, 0.05)),
-            half_space((0.0, 0.0, sole + 0.02), (0.0, 0.0, 1.0)),
-            0.006,
-        )
-        fore = intersection(
-            ellipsoid((toe - 0.008, 0.0, sole + 0.006), (tip - toe + 0.006, 0.98 * wide, 0.05)),
-            half_space((0.0, 0.0, sole + 0.018), (0.0, 0.0, 1.0)),
-            0.006,
-        )
+        inner = (toe - 0.01, -sign * 0.012, sole + 0.026), (tip - 0.032, sign * -0.012, sole + 0.022)
+        outer = (toe - 0.012, sign * 0.014, sole + 0.024), (tip - 0.052, sign * 0.016, sole + 0.020)
+        front = [round_cone(*inner, 0.033, 0.026), round_cone(*outer, 0.031, 0.024)]
+        heel_sole = ellipsoid((0.5 * (heel + toe), 0.0, sole + 0.006), (0.5 * (toe - heel) + 0.024, 0.80 * wide, 0.05))
+        hind = intersection(heel_sole, half_space((0.0, 0.0, sole + 0.02), (0.0, 0.0, 1.0)), 0.006)
+        toe_sole = ellipsoid((toe - 0.008, 0.0, sole + 0.006), (tip - toe + 0.006, 0.98 * wide, 0.05))
+        fore = intersection(toe_sole, half_space((0.0, 0.0, sole + 0.018), (0.0, 0.0, 1.0)), 0.006)
         back_field, front_field = union([*last, hind], 0.02), union([*front, fore], 0.012)
-        body = intersection(
-            union([back_field, front_field], 0.02), half_space((0.0, 0.0, sole), (0.0, 0.0, -1.0)), 0.004
-        )
+        floor = half_space((0.0, 0.0, sole), (0.0, 0.0, -1.0))
+        body = intersection(union([back_field, front_field], 0.02), floor, 0.004)
         frame = self.bind[f"{side}_foot"]
         corners = [self.at(f"{side}_foot", (x, y, z)) for x in (heel, tip) for y in (-wide, wide) for z in (sole, 0.04)]
         low, high = bounds(corners, 0.035)
+        before_toes = half_space((toe, 0.0, 0.0), (1.0, 0.0, 0.0))
         claims = [
             Claim(f"{side}_shank", placed(half_space((0.0, 0.0, 0.02), (0.0, 0.0, -1.0)), frame)),
-            Claim(
-                f"{side}_foot", placed(intersection(back_field, half_space((toe, 0.0, 0.0), (1.0, 0.0, 0.0))), frame)
-            ),
+            Claim(f"{side}_foot", placed(intersection(back_field, before_toes), frame)),
             Claim(f"{side}_toes", placed(half_space((toe, 0.0, 0.0), (-1.0, 0.0, 0.0)), frame), 0.010),
         ]
         return Garment(f"{side}_shoe", COLORS.shoes, placed(body, frame), low, high, 0.012, claims)

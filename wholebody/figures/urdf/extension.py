@@ -59,7 +59,7 @@ from wholebody.figures.motion_ranges import (
     TwistRange,
 )
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.figures.reduction import drop_rigid_pairs
+from wholebody.figures.self_pairs import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
 
 SIZES = ("stature", "mass", "age", "shoes", "clothing")

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -22,20 +21,13 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
+from wholebody.figures.model_check import along_z
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
 from wholebody.figures.urdf.file import UrdfFile, read_urdf
 from wholebody.figures.urdf.joints import Mimic, UrdfJoint
 from wholebody.figures.urdf.srdf import read_srdf
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
-
-
-class _Law(NamedTuple):
-    """A joint's value as ``slope * leader + offset``."""
-
-    leader: str
-    slope: float
-    offset: float
 
 
 def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
@@ -56,12 +48,9 @@ def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
 
 def _lay_in_plane(model: pin.Model, joint: UrdfJoint) -> None:
     """Let a planar joint move in the plane normal to its axis: Pinocchio's moves in x and y of its frame."""
-    z = joint.axis
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    turned = pin.SE3(np.column_stack((x, np.cross(z, x), z)), np.zeros(3))
-    if z[2] == 1.0:
+    if joint.axis[2] == 1.0:
         return
+    turned = pin.SE3(along_z(joint.axis), np.zeros(3))
     back, index = turned.inverse(), model.getJointId(joint.name)
     model.jointPlacements[index] = model.jointPlacements[index] * turned
     model.inertias[index] = back.act(model.inertias[index])
@@ -80,28 +69,28 @@ def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, .
     notes = []
     for name, law in laws.items():
         own = by_name[name]
-        low, high = sorted((end - law.offset) / law.slope for end in (own.lower, own.upper))
-        kept = max(low, ends[law.leader][0]), min(high, ends[law.leader][1])
+        low, high = sorted((end - law.offset) / law.multiplier for end in (own.lower, own.upper))
+        kept = max(low, ends[law.joint][0]), min(high, ends[law.joint][1])
         if kept[0] > kept[1]:
-            note = f"its limits exclude those of {shown(law.leader)}, so they are left out"
+            note = f"its limits exclude those of {shown(law.joint)}, so they are left out"
             notes.append(f"joint {shown(name)}: {note}")
             continue
-        ends[law.leader] = kept
+        ends[law.joint] = kept
     made = [with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints]
     return tuple(made), tuple(notes)
 
 
-def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:
+def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, Mimic]:
     """The law of every joint that follows another, directly or through others."""
     by_name = {joint.name: joint for joint in joints}
-    laws: dict[str, _Law] = {}
+    laws: dict[str, Mimic] = {}
     for joint in joints:
         slope, offset, at = 1.0, 0.0, joint
         while at.mimic is not None:
             slope, offset = slope * at.mimic.multiplier, offset + slope * at.mimic.offset
             at = by_name[at.mimic.joint]
         if at is not joint:
-            laws[joint.name] = _Law(at.name, slope, offset)
+            laws[joint.name] = Mimic(at.name, slope, offset)
     return laws
 
 
@@ -112,12 +101,10 @@ def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJ
     made, notes = [], []
     for joint in joints:
         law = laws.get(joint.name)
-        if law is None or (law.leader not in fixed and law.slope != 0.0):
+        if law is None or (law.joint not in fixed and law.multiplier != 0.0):
             made.append(joint)
             continue
-        notes.append(
-            f"joint {shown(joint.name)}: it mimics {shown(law.leader)}, which does not move it, so it is fixed"
-        )
+        notes.append(f"joint {shown(joint.name)}: it mimics {shown(law.joint)}, which does not move it, so it is fixed")
         if joint.kind == "prismatic":
             moved = pin.SE3(np.eye(3), law.offset * joint.axis)
         else:
@@ -130,29 +117,26 @@ def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> t
     """Make the first of joints that move together the leader; its limits are those of the file's leader."""
     laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
     first: dict[str, str] = {}
-    for name in sorted({*laws, *(law.leader for law in laws.values())}, key=order.__getitem__):
-        first.setdefault(laws[name].leader if name in laws else name, name)
+    for name in sorted({*laws, *(law.joint for law in laws.values())}, key=order.__getitem__):
+        first.setdefault(laws[name].joint if name in laws else name, name)
     made = []
     for joint in joints:
-        law = laws.get(joint.name, _Law(joint.name, 1.0, 0.0))
-        if law.leader not in first:
+        law = laws.get(joint.name, Mimic(joint.name, 1.0, 0.0))
+        if law.joint not in first:
             made.append(joint)
             continue
         # a revolute joint without limits would be a point on a circle, which no joint can follow
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
-        head = first[law.leader]
+        head = first[law.joint]
         if joint.name != head:
-            base = laws.get(head, _Law(head, 1.0, 0.0))
-            slope = law.slope / base.slope
+            base = laws.get(head, Mimic(head, 1.0, 0.0))
+            slope = law.multiplier / base.multiplier
             made.append(with_values(joint, kind=kind, mimic=Mimic(head, slope, law.offset - slope * base.offset)))
             continue
-        leader = by_name[law.leader]
-        ends = sorted(law.slope * end + law.offset for end in (leader.lower, leader.upper))
-        made.append(
-            with_values(
-                joint, kind=kind, mimic=None, lower=ends[0], upper=ends[1], velocity=abs(law.slope) * leader.velocity
-            )
-        )
+        leader = by_name[law.joint]
+        low, high = sorted(law.multiplier * end + law.offset for end in (leader.lower, leader.upper))
+        velocity = abs(law.multiplier) * leader.velocity
+        made.append(with_values(joint, kind=kind, mimic=None, lower=low, upper=high, velocity=velocity))
     return tuple(made)
 
 
@@ -173,16 +157,9 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
         if name in urdf.inertials:
             link.append(urdf.inertials[name])
     for joint in joints:
-        made = add_joint(
-            robot,
-            joint.name,
-            joint.kind,
-            joint.parent,
-            joint.child,
-            origin=joint.origin,
-            axis=None if joint.kind in ("fixed", "floating") else joint.axis,
-            limit=ANY_LIMIT if joint.kind in ("revolute", "prismatic") else None,
-        )
+        axis = None if joint.kind in ("fixed", "floating") else joint.axis
+        limit = ANY_LIMIT if joint.kind in ("revolute", "prismatic") else None
+        made = add_joint(robot, *joint[:4], origin=joint.origin, axis=axis, limit=limit)
         if joint.mimic is not None:
             multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
             SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
@@ -233,9 +210,8 @@ def urdf_figure(
     )
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
-    robot = Robot(
-        urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual_of_links(model, urdf.visuals)
-    )
+    visual = visual_of_links(model, ((number, *one) for number, one in enumerate(urdf.visuals)))
+    robot = Robot(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual)
     return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -13,7 +14,7 @@ from wholebody.base.arrays import with_values
 from wholebody.base.checks import color, shown
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import is_file
-from wholebody.figures.link_pieces import LinkShape
+from wholebody.figures.link_pieces import Color, LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_xml, unique_names
 from wholebody.geometry.pieces import LARGEST
@@ -26,7 +27,7 @@ class LinkVisual(NamedTuple):
     """One visual of a link, whose file is absolute; red, green, blue, alpha of its material, None without one."""
 
     shape: LinkShape
-    color: tuple[float, float, float, float] | None
+    color: Color | None
 
 
 class UrdfFile(NamedTuple):
@@ -39,7 +40,7 @@ class UrdfFile(NamedTuple):
     joints: tuple[UrdfJoint, ...]  # in the order of the file
     shapes: tuple[LinkShape, ...]  # collision shapes in the order of the file
     # link to red, green, blue, alpha of the first of its visuals that has a colour
-    colors: dict[str, tuple[float, float, float, float]]
+    colors: dict[str, Color]
     visuals: tuple[LinkVisual, ...]  # what the file wants drawn, without what is wholly transparent or cannot be read
     extension: Element | None  # the element `EXTENSION`, or None
     notes: tuple[str, ...]  # one sentence for each missing part that was filled in
@@ -58,35 +59,37 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     if not links:
         raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")
     joints, root, notes = read_joints(robot, links, path)
-    inertials = {}
+    painted, remarks = _paint(robot)
+    inertials, shapes, colors, visuals = dict[str, Element](), list[LinkShape](), dict[str, Color](), list[LinkVisual]()
     for link in robot.findall("link"):
-        inertial = link.find("inertial")
+        own, inertial = str(link.get("name")), link.find("inertial")
         if inertial is not None:
-            _check_inertial(inertial, f"{path}: link {shown(link.get('name'))}")
-            inertials[str(link.get("name"))] = inertial
-    shapes = tuple(shape for link in robot.findall("link") for shape in _shapes(link, path, tuple(package_dirs)))
+            _check_inertial(inertial, f"{path}: link {shown(own)}")
+            inertials[own] = inertial
+        shapes += _shapes(link, path, package_dirs)
+        for visual in link.findall("visual"):
+            paint = painted.get(visual)
+            # what is wholly transparent in the file is still a body that touches, so it keeps the usual colour
+            if paint is not None and paint[3] == 0.0:
+                continue
+            if paint is not None:
+                colors.setdefault(own, paint)
+            with suppress(FileFormatError):  # the collision shapes are drawn where there is no other
+                visuals.append(LinkVisual(_shape(visual, own, path, package_dirs), paint))
     ordered = (root, *(name for name in links if name != root))
     name = robot.get("name") or path.stem
-    painted, remarks = _paint(robot)
-    colors = {}
-    for link in robot.findall("link"):
-        # what is wholly transparent in the file is still a body that touches, so it keeps the usual colour
-        seen = [paint for visual in link.findall("visual") if (paint := painted.get(visual)) and paint[3] > 0.0]
-        if seen:
-            colors[str(link.get("name"))] = seen[0]
-    visuals = tuple(_visuals(robot, painted, path, tuple(package_dirs)))
     return UrdfFile(
-        path, name, ordered, inertials, joints, shapes, colors, visuals, robot.find(EXTENSION), (*notes, *remarks)
+        path, name, ordered, inertials, joints, tuple(shapes), colors, tuple(visuals), robot.find(EXTENSION),
+        (*notes, *remarks),
     )  # fmt: skip
 
 
-def _paint(robot: Element) -> tuple[dict[Element, tuple[float, float, float, float]], list[str]]:
+def _paint(robot: Element) -> tuple[dict[Element, Color], list[str]]:
     """Colours of visuals, and one sentence on each material that has none; no robot is refused for one."""
-    named: dict[str, tuple[float, float, float, float]] = {}
+    named: dict[str, Color] = {}
     notes = []
-    materials = [*robot.findall("material"), *robot.findall("link/visual/material")]
     own = {}
-    for material in materials:
+    for material in (*robot.findall("material"), *robot.findall("link/visual/material")):
         element = material.find("color")
         if element is None:
             continue
@@ -106,24 +109,6 @@ def _paint(robot: Element) -> tuple[dict[Element, tuple[float, float, float, flo
     return painted, notes
 
 
-def _visuals(
-    robot: Element,
-    painted: dict[Element, tuple[float, float, float, float]],
-    path: Path,
-    package_dirs: tuple[Path, ...],
-) -> Iterator[LinkVisual]:
-    """What is drawn; a visual that cannot be read is left out: the collision shapes are drawn where there is none."""
-    for link in robot.findall("link"):
-        for visual in link.findall("visual"):
-            color = painted.get(visual)
-            if color is not None and color[3] == 0.0:
-                continue
-            try:
-                yield LinkVisual(_shape(visual, str(link.get("name")), path, package_dirs), color)
-            except FileFormatError:
-                continue
-
-
 def _check_inertial(inertial: Element, place: str) -> None:
     """Check masses, and moments only against absurd values: many robots' moments are not quite physical."""
     mass = inertial.find("mass")
@@ -139,16 +124,15 @@ def _check_inertial(inertial: Element, place: str) -> None:
     placement(inertial, place, LARGEST)
 
 
-def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterator[LinkShape]:
+def _shapes(link: Element, path: Path, package_dirs: Sequence[Path]) -> Iterator[LinkShape]:
     capsules = {element.get("name") for element in link.findall("collision_checking/capsule")} - {None}
     for collision in link.findall("collision"):
         shape = _shape(collision, str(link.get("name")), path, package_dirs)
-        yield (
-            with_values(shape, kind="capsule") if collision.get("name") in capsules and len(shape.size) == 2 else shape
-        )
+        capsule = collision.get("name") in capsules and len(shape.size) == 2
+        yield with_values(shape, kind="capsule") if capsule else shape
 
 
-def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
+def _shape(element: Element, link: str, path: Path, package_dirs: Sequence[Path]) -> LinkShape:
     place = f"{path}: {element.tag} of link {shown(link)}"
     shapes = element.findall("geometry/*")
     if len(shapes) != 1:
@@ -205,7 +189,6 @@ def _found(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> P
 
 
 def _ros_folders() -> list[Path]:
-    folders = [Path(entry) for entry in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if entry]
-    return folders + [
-        Path(entry) / "share" for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry
-    ]
+    given = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
+    listed = ((os.environ.get(variable, "").split(os.pathsep), below) for variable, below in given)
+    return [Path(entry) / below for entries, below in listed for entry in entries if entry]
