@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from wholebody.cli.command import command, flag, option
+from wholebody.base.checks import known
+from wholebody.base.errors import UnknownNameError
+from wholebody.base.files import checked_target
+from wholebody.cli.pose import pose
+from wholebody.figures.packaged_urdf import script_paths, task_paths
+from wholebody.view.gallery import Exhibit, write_gallery
 
 
-@command(
-    "demo",
-    "pose a packaged task",
-    """\
-Pose a packaged task (by default a person who reaches between the boards of a shelf), and print where the pictures are.
-You can copy and change the task file.""",
-    option("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)"),
-    flag("--list", "list the tasks"),
-    option("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)"),
-)
 def demo(arguments: argparse.Namespace) -> int:
     """List the tasks, or pose one."""
-    from wholebody.base.errors import UnknownNameError
-    from wholebody.cli.pose import pose
-    from wholebody.figures.packaged_urdf import task_paths
-
     tasks = task_paths()
     if arguments.list:
         for name, path in tasks.items():
@@ -36,21 +26,8 @@ def demo(arguments: argparse.Namespace) -> int:
     return code
 
 
-@command(
-    "gallery",
-    "run the example scripts, and show them on one page",
-    """\
-Run the packaged example scripts, and write one page that opens without a network. It has the picture of each, its
-story, what it printed, its code, and its scene to turn. All of them take some minutes.""",
-    option("names", nargs="*", metavar="NAME", help="which scripts (default: all)"),
-    option("--out", type=Path, default=Path("gallery.html"), metavar="PAGE", help="page (default: gallery.html)"),
-)
 def gallery(arguments: argparse.Namespace) -> int:
     """Run the scripts, and write the page."""
-    from wholebody.base.checks import known
-    from wholebody.base.files import checked_target
-    from wholebody.figures.packaged_urdf import script_paths
-    from wholebody.view.gallery import Exhibit, write_gallery
 
     def say(made: Exhibit) -> None:
         print(f"{made.name}: {'failed' if made.failed else 'done'} in {made.seconds:.0f} s", flush=True)

@@ -6,51 +6,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from wholebody.cli.arguments import JOBS
-from wholebody.cli.command import command, option
+from rich.console import Console
+
+from wholebody.base.files import make_folder
+from wholebody.cli.tables import console, table
+from wholebody.studies.study import study
+from wholebody.studies.study_files import read_study
 
 
-@command(
-    "study",
-    "solve one task for many people, targets and layouts",
-    """\
-Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
-
-  cases.csv         one row a case
-  records.jsonl     the same with the postures; an interrupted run continues from it""",
-    option("study", type=Path, metavar="FILE.toml", help="the study file"),
-    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
-    *JOBS,
-    epilog="""\
-a study file:
-  task = "shelf.toml"                     # relative to the study file
-
-  [[person]]
-  name = "small woman"
-  sex = "female"
-  stature = 1.53
-
-  [[target]]                              # of the task's first goal of type point or frame
-  name = "upper board"
-  at = [0.45, -0.20, 1.45]
-
-  [[layout]]
-  name = "nearer"
-  move = { shelf = [0.55, 0.0, 0.0] }     # things of the task
-
-examples:
-  wholebody study shelf-study.toml --jobs 2
-  wholebody study shelf-study.toml --out results/study""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """Solve, report and write; 1 if a case is not solved."""
-    from rich.console import Console
-
-    from wholebody.base.files import make_folder
-    from wholebody.cli.tables import console, table
-    from wholebody.studies.study import study
-    from wholebody.studies.study_files import read_study
-
     asked = read_study(arguments.study)
     out = arguments.out or Path("out") / arguments.study.stem
     make_folder(out)
