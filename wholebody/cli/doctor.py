@@ -11,7 +11,6 @@ from wholebody.base.errors import MissingPackageError
 from wholebody.cli.main import parser
 from wholebody.cli.tables import console
 from wholebody.doctor import examine
-from wholebody.geometry.mesh_cache import clear_cache
 from wholebody.version import __version__
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
@@ -20,6 +19,8 @@ _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[re
 def doctor(arguments: argparse.Namespace) -> int:
     """Examine and print; 1 if there are faults."""
     if arguments.clear_cache:
+        from wholebody.geometry.mesh_cache import clear_cache  # loads what the examination may find broken
+
         state = clear_cache()
         print(f"removed {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
         return 0
