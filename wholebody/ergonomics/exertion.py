@@ -20,7 +20,7 @@ from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import ComputedTogether, Surroundings, filled
+from wholebody.tasks.base import ComputedTogether, filled
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.forces import GRAVITY, Force, Forces, Loads, point_rows, pressure, resolved
 
@@ -141,7 +141,7 @@ class Statics(NamedTuple):
         return (whole - ROUND) / LEVER - float(force @ unit), moment @ d_moment / (whole * LEVER) - force @ d_unit
 
 
-def statics_of(scene: Surroundings, term: Exertion | StrengthLimit) -> Statics:
+def statics_of(scene: Scene, term: Exertion | StrengthLimit) -> Statics:
     """What holds a scene's person, or one of several, under forces; standing, on both soles."""
     where, forces, person, standing = type(term).__name__, term.forces, term.person, term.standing
     joined, prefix = scene.figure, ""
@@ -204,7 +204,7 @@ class Exertion(SumOfSquares):
     weight: inputs.Weight = 1.0
     statics: Statics = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Exertion:
+    def resolve(self, scene: Scene, start: Array) -> Exertion:
         """Look up the joints and their strength."""
         return filled(self, statics=statics_of(scene, self))
 
@@ -247,7 +247,7 @@ class StrengthLimit(ComputedTogether):
     compression: Annotated[float, Range(100.0, 1e5, "N")] | None = MOST
     statics: Statics = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> StrengthLimit:
+    def resolve(self, scene: Scene, start: Array) -> StrengthLimit:
         """Look up the joints and their strength."""
         return filled(self, statics=statics_of(scene, self))
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Measure, Surroundings, filled
+from wholebody.tasks.base import Measure, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
 STEEPNESS = 2.5  # Half the 5.0 in eq. 3.14: the penalty at the ratio r from a limit is cos(2.5 r)^200
@@ -59,7 +60,7 @@ class Discomfort(Measure):
     weight: inputs.Weight = 1.0
     limited: LimitedJoints = field(init=False, repr=False)  # the joints that have two limits
 
-    def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
+    def resolve(self, scene: Scene, start: Array) -> Discomfort:
         """Read the limits, the neutral posture and the weights of the figure."""
         return filled(self, limited=inputs.once(scene, Discomfort, partial(_limited, scene.figure)))
 

@@ -11,8 +11,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Expansion, Measure, Surroundings, filled
+from wholebody.tasks.base import Expansion, Measure, filled
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
@@ -131,7 +132,7 @@ class Effort(DistanceMeasure):
     weight: inputs.Weight = 1.0
     distance: SquaredDistance = field(init=False, repr=False)  # the start, and the weight of every degree of freedom
 
-    def resolve(self, scene: Surroundings, start: Array) -> Effort:
+    def resolve(self, scene: Scene, start: Array) -> Effort:
         """Store the start."""
         return filled(self, distance=SquaredDistance.build(start, scene.figure.effort_weights))
 
@@ -156,7 +157,7 @@ class Displacement(DistanceMeasure):
     weight: inputs.Weight = 1.0
     distance: SquaredDistance = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Displacement:
+    def resolve(self, scene: Scene, start: Array) -> Displacement:
         """Read the neutral posture and the weights of the figure."""
         figure = scene.figure
         return filled(self, distance=SquaredDistance.build(figure.neutral, figure.neutral_weights))
@@ -218,7 +219,7 @@ class RotationEffort(SumOfSquares):
     balls: tuple[BallJoint, ...] = field(init=False, repr=False)  # the ball joints
     others: SquaredDistance = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:
+    def resolve(self, scene: Scene, start: Array) -> RotationEffort:
         """Find the ball joints, and store the start."""
         weights = np.array(scene.figure.effort_weights, dtype=float)
         balls = ball_joints(scene.model, start, weights)

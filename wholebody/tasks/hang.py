@@ -12,9 +12,10 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Names
 from wholebody.figures.state import State, Wrench
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.distance import SumOfSquares
 
 HANGS = 6.0
@@ -50,7 +51,7 @@ class Hang(SumOfSquares):
     places: tuple[inputs.Place, ...] = field(init=False, repr=False)
     down: Array = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Hang:
+    def resolve(self, scene: Scene, start: Array) -> Hang:
         """Find the upper arms, and how they hang in the first posture."""
         places, figure = tuple(inputs.find_place(scene, arm, "Hang") for arm in self.arms), scene.figure
         with figure.posed(figure.neutral) as upright:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Measure, Surroundings, filled
+from wholebody.tasks.base import Measure, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
 
@@ -47,7 +48,7 @@ class PotentialEnergy(Measure):
     weight: inputs.Weight = 1.0
     masses: Masses = field(init=False, repr=False)  # of the segments
 
-    def resolve(self, scene: Surroundings, start: Array) -> PotentialEnergy:
+    def resolve(self, scene: Scene, start: Array) -> PotentialEnergy:
         """Compute the weights of the segments, and their heights in the neutral posture."""
         model = scene.model
         neutral = np.array(scene.figure.neutral, dtype=float)

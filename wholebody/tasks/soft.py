@@ -9,8 +9,9 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import instance
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.distance import SumOfSquares
 
 
@@ -42,7 +43,7 @@ class Soft(SumOfSquares):
         super().__post_init__()
         instance(self.goal, Goal, "Soft: goal", 'give a goal such as wb.Point("left_palm", place)')
 
-    def resolve(self, scene: Surroundings, start: Array) -> Soft:
+    def resolve(self, scene: Scene, start: Array) -> Soft:
         """Resolve the goal."""
         return filled(self, goal=self.goal.resolve(scene, start))
 

@@ -14,10 +14,11 @@ from wholebody.base.checks import shown, some
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, SolePolygon, polygon
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Facing, Gap, Made, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP
@@ -61,7 +62,7 @@ class Stand(TermOfParts):
     knees: Annotated[Sequence[str], Names("['right_shank']", least=0)] = ()
     keeps: float = field(init=False, repr=False, default=0.0)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Stand:
+    def resolve(self, scene: Scene, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
         where = f"Stand({shown(self.on)})"
         if stray := [str(knee) for knee in self.knees if knee not in self.feet]:
@@ -79,7 +80,7 @@ class Stand(TermOfParts):
             keeps = STEADY * polygon(corners).width if self.margin is None else self.margin
         return filled(self, parts=parts, touches=touches, keeps=keeps)
 
-    def _between(self, scene: Surroundings, where: str, state: State, rest: State) -> Made:
+    def _between(self, scene: Scene, where: str, state: State, rest: State) -> Made:
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
         touches: tuple[tuple[str, str], ...] = ()
@@ -161,7 +162,7 @@ class Stance(SumOfSquares):
     places: tuple[inputs.Place, inputs.Place] = field(init=False, repr=False)
     rest: Array = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Stance:
+    def resolve(self, scene: Scene, start: Array) -> Stance:
         """Find the feet, and how they are in the first posture."""
         if len(self.feet) != 2:
             raise InputError(f"Stance: feet has {len(self.feet)} names; give two")
