@@ -101,7 +101,7 @@ You can copy and change the task file.""",
         option("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)"),
         flag("--list", "list the tasks"),
         option("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)"),
-    )(later("demo.demo")),
+    )(later("pose.demo")),
     command(
         "gallery",
         "run the example scripts, and show them on one page",
@@ -110,7 +110,7 @@ Run the packaged example scripts, and write one page that opens without a networ
 story, what it printed, its code, and its scene to turn. All of them take some minutes.""",
         option("names", nargs="*", metavar="NAME", help="which scripts (default: all)"),
         option("--out", type=Path, default=Path("gallery.html"), metavar="PAGE", help="page (default: gallery.html)"),
-    )(later("demo.gallery")),
+    )(later("pose.gallery")),
     command(
         "interact",
         "follow a tracker frame by frame through a gallery without penetration",
@@ -233,7 +233,7 @@ a study file:
 examples:
   wholebody study shelf-study.toml --jobs 2
   wholebody study shelf-study.toml --out results/study""",
-    )(later("study.run")),
+    )(later("study.run_study")),
     command(
         "reach",
         "map the places that a hand or another frame can reach",
@@ -256,7 +256,7 @@ goals, and write into a folder:
 examples:
   wholebody reach seat.toml --frame right_index_tip --low 0,-0.8,0.4 --high 1.0,0.4,1.6 --step 0.1
   wholebody reach seat.toml --frame left_palm --low 0.2,-0.5,0.9 --high 0.9,0.5,0.9 --step 0.05 --jobs 2""",
-    )(later("reach.run")),
+    )(later("study.run_reach")),
     command(
         "assess",
         "judge a posture, and score its ergonomics",

@@ -1,4 +1,4 @@
-"""`wholebody pose`: solve the problem of a task file, and write posture, scene and picture."""
+"""`wholebody pose`, `demo` and `gallery`: solve a task file, a packaged one, or run the example scripts."""
 
 from __future__ import annotations
 
@@ -13,13 +13,18 @@ from rich.table import Table
 
 from wholebody.assessment.posture import Assessment, distance_and_angle
 from wholebody.base import files
+from wholebody.base.checks import known
+from wholebody.base.errors import UnknownNameError
+from wholebody.base.files import checked_target
 from wholebody.cli.show import draw as draw_scene
 from wholebody.cli.tables import console, table
+from wholebody.figures.packaged_urdf import script_paths, task_paths
 from wholebody.figures.state import State
 from wholebody.methods.solve import method_named, solve
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.taskfile import Task, read_task, result
+from wholebody.view.gallery import Exhibit, write_gallery
 from wholebody.view.screenshot import Screenshots
 
 CONTACTS = 10
@@ -133,3 +138,32 @@ def _measures(problem: Problem, solution: Solution) -> Table:
     for term in problem.measures:
         made.add_row(type(term).__name__, f"{term.weight:g}", f"{term.value(state):.4f}")
     return made
+
+
+def demo(arguments: argparse.Namespace) -> int:
+    """List the tasks, or pose one."""
+    tasks = task_paths()
+    if arguments.list:
+        for name, path in tasks.items():
+            print(f"{name:25} {path}")
+        return 0
+    if arguments.name not in tasks:
+        raise UnknownNameError("demo", arguments.name, tasks)
+    code = pose(tasks[arguments.name], None, arguments.out)
+    print(f"the task is {tasks[arguments.name]}; to turn the scene about, open {arguments.out / 'scene.html'}")
+    return code
+
+
+def gallery(arguments: argparse.Namespace) -> int:
+    """Run the scripts, and write the page."""
+
+    def say(made: Exhibit) -> None:
+        print(f"{made.name}: {'failed' if made.failed else 'done'} in {made.seconds:.0f} s", flush=True)
+
+    path = checked_target(arguments.out, "--out", "a page", (".htm", ".html"))
+    scripts = script_paths()
+    chosen = [known(name, scripts, "example", "gallery") for name in arguments.names] or list(scripts)
+    made = write_gallery([scripts[name] for name in chosen], path, say)
+    failed = [one.name for one in made if one.failed]
+    print(f"{path}: {len(made)} scenes" + (f"; failed: {', '.join(failed)}" if failed else ""))
+    return 1 if failed else 0

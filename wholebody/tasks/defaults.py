@@ -18,12 +18,11 @@ from wholebody.tasks.checks import is_a
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
-from wholebody.tasks.hang import Hang
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
-from wholebody.tasks.stand import Stance, Stand
+from wholebody.tasks.stand import Hang, Stance, Stand
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
