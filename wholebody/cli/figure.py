@@ -59,7 +59,7 @@ def show_figure(figure: Figure) -> None:
     for kind, known in listed.items():
         names.add_row(kind, escape(", ".join(known)))
     shown.print(names)
-    joints = table("joint", "lowest", "highest", title="")
+    joints = table("joint", "lowest", "highest")
     limits = figure.limits
     ranges = dict(zip(limits.idx_q.tolist(), zip(limits.lower, limits.upper, strict=True), strict=True))
     for name in figure.joints:

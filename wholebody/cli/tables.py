@@ -38,9 +38,9 @@ def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], Any]]:
             sys.stderr.write("\r\x1b[K")
 
 
-def table(*columns: str, title: str = "") -> Table:
+def table(*columns: str) -> Table:
     """An empty table; every column but the first is aligned right."""
-    made = Table(title=title or None, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
+    made = Table(box=None, padding=(0, 2, 0, 0))
     for number, column in enumerate(columns):
         made.add_column(column, justify="right" if number else "left", header_style="dim", overflow="fold")
     return made
