@@ -18,8 +18,8 @@ from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import only, report
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.bench.command import listed, measuring, publish, seed
-from wholebody.cli.bench.measuring import CLIPS, chosen, clips
+from wholebody.cli.bench.command import CLIPS, listed, measuring, publish, seed
+from wholebody.cli.bench.measurements import chosen, clips
 from wholebody.cli.command import command, count, flag, option
 
 QUICK = 45  # quadratic programs

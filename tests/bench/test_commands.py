@@ -12,7 +12,7 @@ from wholebody.bench import plot_style
 from wholebody.bench.measure.track import VARIANTS
 from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import adapters, stepping
-from wholebody.cli.bench import run as group
+from wholebody.cli.bench import group
 
 
 def bench(*words: str) -> int:
@@ -32,7 +32,7 @@ def docs(tmp_path: Path) -> Path:
 
 def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     reaches = VARIANTS[1:2]
-    monkeypatch.setattr("wholebody.bench.measure.track.VARIANTS", reaches)
+    monkeypatch.setattr("wholebody.cli.bench.measurements.VARIANTS", reaches)
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "1", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words, "--update-docs", str(docs)) == 0
@@ -64,7 +64,7 @@ def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: py
         raise RuntimeError("no chart")
 
     monkeypatch.setattr(plot_style, "save", fails)
-    monkeypatch.setattr("wholebody.bench.measure.track.VARIANTS", VARIANTS[2:])
+    monkeypatch.setattr("wholebody.cli.bench.measurements.VARIANTS", VARIANTS[2:])
     out = tmp_path / "out"
     with pytest.raises(RuntimeError, match="no chart"):
         bench("step", "--repeats", "1", "--steps", "2", "--tools", "wholebody", "--out", str(out))

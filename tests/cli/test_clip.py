@@ -156,7 +156,7 @@ def test_a_strip_has_the_ghost_of_each_of_its_frames(
         drawn.update(postures=postures, ghosts=ghosts)
         return out
 
-    monkeypatch.setattr("wholebody.view.side_by_side.write_filmstrip", strip)
+    monkeypatch.setattr("wholebody.cli.clip.play.write_filmstrip", strip)
     clip = wb.read_clip(walk, wb.load("human"))
     before = clip.with_q(clip.q[::-1]).write(tmp_path / "before.npz")
     given = ["clip", "play", str(walk), "--out", str(tmp_path / "strip.png"), "--pictures", "3"]
@@ -178,7 +178,7 @@ def test_play_shows_what_the_body_wears_on_a_floor_below_it(
             shown.append(scene)
             super().__init__(scene, **given)
 
-    monkeypatch.setattr(view, "Viewer", Seen)
+    monkeypatch.setattr("wholebody.cli.clip.play.Viewer", Seen)
     clip = wb.read_clip(walk, wb.load("human"))
     q = clip.q.copy()
     q[:, 2] -= 0.25

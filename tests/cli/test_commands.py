@@ -19,7 +19,6 @@ from tests.needs import each
 from tests.task_text import figure, point, table
 from wholebody.cli import main
 from wholebody.figures.packaged_urdf import task_paths
-from wholebody.methods import solve as solving
 from wholebody.view import browser, screenshot
 
 TASK = (
@@ -261,7 +260,12 @@ def test_help_is_there_and_light() -> None:
 
 
 UNUSED = (
-    *("wholebody.cli.clip", "wholebody.cli.bench", "wholebody.motion.clip", "wholebody.tracking.drag"),
+    *(
+        "wholebody.cli.clip.avoid",
+        "wholebody.cli.bench.measurements",
+        "wholebody.motion.clip",
+        "wholebody.tracking.drag",
+    ),
     *("wholebody.methods.newton.assembly", "wholebody.figures.surface.making", "scipy.ndimage", "scipy.spatial"),
     *("asyncio", "jinja2", "matplotlib", "rich.progress", "tornado", "trimesh"),
 )
@@ -296,7 +300,7 @@ def test_the_browser_starts_before_the_posture_is_found(
         raise wb.InputError(f"{len(started)} browsers wait")
 
     monkeypatch.setattr(screenshot.Screenshots, "start", lambda _: started.append(1))
-    monkeypatch.setattr(solving, "solve", solve)
+    monkeypatch.setattr("wholebody.cli.pose.solve", solve)
     assert main(["pose", str(task)]) == 2
     assert "1 browsers wait" in capsys.readouterr().err
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -91,3 +93,9 @@ def test_a_ros_workspace_on_the_paths_is_a_fault(fake: Fake, tmp_path: Path) -> 
     fake()
     report = examination.examine({"PYTHONPATH": str(tmp_path), "LD_LIBRARY_PATH": str(tmp_path)})
     assert [repair for _, repair in report.faults] == ["unset PYTHONPATH", "unset LD_LIBRARY_PATH"]
+
+
+def test_the_examination_loads_nothing_that_it_may_find_broken() -> None:
+    code = "import sys, wholebody.cli.doctor; print(*{'pinocchio', 'coal', 'osqp'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not done.stdout.split()

@@ -45,9 +45,9 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
     ("old", "new", "expected"),
     [
         # a wrong number
-        ("clearance = 0.01", "clearance = 10", ["task.toml:1", "key clearance", "from 0 to 0.5 m"]),
+        ("clearance = 0.01", "clearance = 10", ["task.toml:1", "key clearance", "between 0 and 0.5 m"]),
         ("clearance = 0.01", "clearance = nan", ["task.toml:1", "key clearance", "nan"]),
-        ("radius = 0.01", "radius = true", ["attach 1, key radius", "True is not a number"]),
+        ("radius = 0.01", "radius = true", ["attach 1, key radius", "is True; give a number"]),
         ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "write 1.75 if it is in centimetres"]),
         ('detail = "spheres"', "proportions = { siting_height = 0.9 }", ["sitting_height"]),
         (
@@ -55,7 +55,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
             "left_elbow_flexion = 30",
             ["task.toml:9", "joints.left_e", "write 0.523599 if it is in degrees"],
         ),
-        ("radius = 0.01", "radius = -0.01", ["task.toml:20", "attach 1, key radius", "0.0001 to 100 m"]),
+        ("radius = 0.01", "radius = -0.01", ["task.toml:20", "attach 1, key radius", "between 0.0001 and 100 m"]),
         (
             "target = [0.4, -0.2, 1.0]",
             "target = [400, -200, 1000]",

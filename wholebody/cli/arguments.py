@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from wholebody.base.batches import threads
 from wholebody.base.checks import is_number
 from wholebody.base.errors import InputError, UnknownNameError, suggestion
 from wholebody.cli.command import Option, checked, count, flag, option
@@ -82,8 +83,6 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _at_once(arguments: argparse.Namespace) -> None:
-    from wholebody.base.batches import threads
-
     arguments.at_once = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
 
 
@@ -93,6 +92,17 @@ JOBS: tuple[Option, ...] = (
     checked(_at_once),
 )
 """How many cases are done `at_once`, and where; a cluster that does not answer is refused before anything is done."""
+
+
+OF_WORK = {
+    "static": "the posture is held for minutes",
+    "repeated": "the action is repeated more than four times a minute",
+    "shock": "the load comes with a shock",
+    "unstable": "the base is unstable, or the posture changes rapidly",
+    "arms_supported": "the arms rest on something",
+    "walking": "the person walks",
+}
+"""Flags about the work that ergonomics score, with their help."""
 
 
 def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:

@@ -3,52 +3,26 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+import math
 from typing import Any
 
-from wholebody.base.errors import InputError
-from wholebody.cli.command import command, flag, option
+from rich.markup import escape
 
-FLAGS = {
-    "static": "the posture is held for minutes",
-    "repeated": "the action is repeated more than four times a minute",
-    "shock": "the load comes with a shock",
-    "unstable": "the base is unstable, or the posture changes rapidly",
-    "arms_supported": "the arms rest on something",
-    "walking": "the person walks",
-}
-OF_SCORES = {*FLAGS, "load", "coupling", "seated", "sex", "percentile"}
+from wholebody.assessment.posture import assess
+from wholebody.base.errors import InputError
+from wholebody.cli.arguments import OF_WORK
+from wholebody.cli.pose import judgement
+from wholebody.cli.tables import console, table
+from wholebody.ergonomics.angles import check_person
+from wholebody.ergonomics.assessment import ergonomics_of
+from wholebody.ergonomics.work import Work
+from wholebody.motion.strength import Strength
+from wholebody.taskfile import result
+
+OF_SCORES = {*OF_WORK, "load", "coupling", "seated", "sex", "percentile"}
 """Options that only the scores of ergonomics read."""
 
 
-@command(
-    "assess",
-    "judge a posture, and score its ergonomics",
-    """\
-Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
-print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it.""",
-    option("result", type=Path, metavar="RESULT.json", help="the result"),
-    flag("--ergonomics", "score the ergonomics of a person"),
-    option("--load", type=float, metavar="KG", help="mass in both hands (default: 0)"),
-    option("--coupling", metavar="WORD", help="grip: good (default), fair, poor, unacceptable"),
-    *(
-        option(f"--{name.replace('_', '-')}", action="store_const", const=True, help=says)
-        for name, says in FLAGS.items()
-    ),
-    option(
-        "--seated",
-        choices=("yes", "no"),
-        help="whether the person sits (default: decided by what is below, or the posture)",
-    ),
-    option("--sex", metavar="SEX", help="of the strength: male or female (default: the person's)"),
-    option("--percentile", type=float, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
-    flag("--json", "print JSON instead of tables"),
-    epilog="""\
-examples:
-  wholebody assess out/shelf/result.json --ergonomics
-  wholebody assess out/shelf/result.json --ergonomics --load 6 --repeated --json
-exit code: 1 if the posture violates a limit, a constraint or a clearance by more than 0.1 mm or mrad""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """Judge and print; 1 if the posture violates something."""
     given = {name: value for name, value in vars(arguments).items() if name in OF_SCORES and value is not None}
@@ -56,20 +30,12 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(
             f"--{next(iter(given)).replace('_', '-')} is read by the scores of ergonomics alone; add --ergonomics"
         )
-    from wholebody.assessment.posture import assess
-    from wholebody.taskfile import result
-
     found = result.read_result(arguments.result)
     task, q = found.task, found.q
     judged = assess(task.problem, q)
     described: dict[str, Any] = {"assessment": judged.summary()}
     scores = None
     if arguments.ergonomics:
-        from wholebody.ergonomics.angles import check_person
-        from wholebody.ergonomics.assessment import ergonomics_of
-        from wholebody.ergonomics.work import Work
-        from wholebody.motion.strength import Strength
-
         figure = task.problem.scene.figure
         if figure.root == "several":
             raise InputError(
@@ -90,12 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _show(judged: Any, scores: Any) -> None:
-    import math
-
-    from rich.markup import escape
-
-    from wholebody.cli.tables import console, judgement, table
-
     shown = console()
     made = table("judged", "")
     made.add_row("goals missed by", f"{1e3 * judged.goal_error:.3f} mm, {math.degrees(judged.goal_angle):.3f} deg")

@@ -1,11 +1,12 @@
-"""How a command is declared: its words, its options and its function in one place."""
+"""How a command is declared: its words, its options and its function."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from importlib import import_module
+from typing import Any
 
 from wholebody.base.errors import InputError
 
@@ -14,13 +15,6 @@ Measure = Callable[[argparse.Namespace], "int | None"]
 
 Option = Callable[[argparse.ArgumentParser], object]
 """Adds itself to a parser."""
-
-
-class Commands(Protocol):
-    """A group of commands, as `argparse` makes it by `add_subparsers`."""
-
-    def add_parser(self, name: str, /, **options: Any) -> argparse.ArgumentParser:
-        """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +28,8 @@ class Command:
     options: tuple[Option, ...]
     measure: Measure
 
-    def add_to(self, commands: Commands) -> None:
-        """Add it to a group of commands."""
+    def add_to(self, commands: Any) -> None:
+        """Add it to what `add_subparsers` of `argparse` makes."""
         lines = "\n" in self.description + self.epilog
         shape = argparse.RawDescriptionHelpFormatter if lines else argparse.HelpFormatter
         parser = commands.add_parser(
@@ -59,6 +53,17 @@ def command(
     return lambda measure: Command(name, help, description, epilog, options, measure)
 
 
+def later(where: str) -> Measure:
+    """What runs a command: a function of a module of `wholebody.cli`, such as "pose.run", imported for the call."""
+
+    def measure(arguments: argparse.Namespace) -> int | None:
+        module, _, name = where.rpartition(".")
+        found: int | None = getattr(import_module(f"wholebody.cli.{module}"), name)(arguments)
+        return found
+
+    return measure
+
+
 @dataclass(frozen=True)
 class Group:
     """A command that has commands of its own, `members`, in the order of the help; `title` is that of their list."""
@@ -69,11 +74,11 @@ class Group:
     members: tuple[Command, ...]
     title: str = "commands"
 
-    def add_to(self, commands: Commands) -> None:
+    def add_to(self, commands: Any) -> None:
         """Add it, with its own commands, to a group of commands."""
         shape = argparse.RawDescriptionHelpFormatter
         parser = commands.add_parser(self.name, help=self.help, description=self.description, formatter_class=shape)
-        kinds: Any = parser.add_subparsers(title=self.title, metavar="COMMAND", required=True)
+        kinds = parser.add_subparsers(title=self.title, metavar="COMMAND", required=True)
         for member in self.members:
             member.add_to(kinds)
 

@@ -4,79 +4,41 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from wholebody.cli.command import command, option
-from wholebody.methods import METHODS
+import numpy as np
 
-if TYPE_CHECKING:
-    from wholebody.problem import Problem
-    from wholebody.taskfile import Task
-    from wholebody.tracking.dragging import Dragged, DragJudgement
-
-
-def _path_or_live(parser: argparse.ArgumentParser) -> None:
-    either = parser.add_mutually_exclusive_group(required=True)
-    either.add_argument("--path", metavar="FILE|circle|line", help="path of the goal")
-    either.add_argument("--live", action="store_true", help="drag handles with the mouse in a browser (needs viser)")
-
-
-@command(
-    "drag",
-    "drag a goal of a task along a path, frame by frame",
-    """\
-Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at a constant speed; a
-frame keeps its orientation. The figure follows frame by frame and at the end meets the goal to 1e-5 m. Print a table
-of times and remaining errors, assessed independently in every frame and between frames. Write into a folder the
-table (Markdown), the numbers of every frame (CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens
-without a network).
-
-paths:
-  line      from the start of the dragged frame to --to, or to the goal's target
-  circle    from the start to a circle of radius --size around the goal's target, normal to --normal
-  FILE      from the start through the points of a text file: x y z in metres, one point a line""",
-    option("task", type=Path, metavar="TASK.toml", help="the task file"),
-    _path_or_live,
-    option("--method", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton along a path, qp with --live)"),
-    option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
-    option("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)"),
-    option("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)"),
-    option("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)"),
-    option(
-        "--normal",
-        type=float,
-        nargs=3,
-        default=(1.0, 0.0, 0.0),
-        metavar=("X", "Y", "Z"),
-        help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
-    ),
-    option("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m"),
-    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)"),
-    epilog="""\
---live opens a page instead: drag the handles on hands, feet, pelvis, head and things with the mouse, click one to
-hold it; "undo" goes back, "save" writes the posture as a task file into the folder.
-
-examples:
-  wholebody drag shelf.toml --live
-  wholebody drag sit_on_chair.toml --path line --method newton
-  wholebody drag look_and_touch_overhead.toml --path circle --normal 0 0 1 --method qp
-  wholebody drag sit_on_chair.toml --path sit_on_chair.csv --frames 300 --out out/chair
-exit code: 1 if the end is not met, or if the overlap in a frame or between two exceeds 1 mm, or a limit is violated""",
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import is_file, make_folder
+from wholebody.bench.rows import chart, report
+from wholebody.bench.tables import machine, write_rows, write_text
+from wholebody.cli.frames import drag_rows, frame_panels, is_clean
+from wholebody.cli.show import viewer_of
+from wholebody.cli.tables import bar, print_rows
+from wholebody.methods.solve import method_named
+from wholebody.problem import Problem
+from wholebody.taskfile import Task, read_task, write_task
+from wholebody.tasks import Frame, Orientation, Point
+from wholebody.tasks.inputs import point
+from wholebody.tracking.dragging import (
+    Dragged,
+    DragJudgement,
+    drag_along,
+    judge_drag,
+    present_position,
+    target_position,
 )
+from wholebody.tracking.live import LiveDrag
+from wholebody.tracking.moving_goals import moving_goal
+from wholebody.tracking.path_following import circle, read_path, spread
+from wholebody.view.live_page import LivePage
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Drag, assess, report and write; 1 if the end is not met or something was penetrated."""
     if arguments.live:
         return live(arguments)
     arguments.method = arguments.method or "newton"
-    from wholebody.base.files import make_folder
-    from wholebody.bench.rows import chart, report
-    from wholebody.bench.tables import machine, write_rows, write_text
-    from wholebody.cli.frames import drag_rows, frame_panels, is_clean
-    from wholebody.cli.tables import print_rows
-    from wholebody.methods.solve import method_named
-    from wholebody.taskfile import read_task
-    from wholebody.tracking.path_following import spread
-
     method_named(arguments.method)
     task = read_task(arguments.task)
     goal = _goal(task.problem, arguments.goal)
@@ -105,12 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def live(arguments: argparse.Namespace) -> int:
     """Let the figure be dragged in a browser until Ctrl-C."""
-    from wholebody.base.errors import InputError
-    from wholebody.base.files import make_folder
-    from wholebody.taskfile import read_task, write_task
-    from wholebody.tracking.live import LiveDrag
-    from wholebody.view.live_page import LivePage
-
     if not 1024 <= arguments.port <= 65535:
         raise InputError(f"--port is {arguments.port}; give a number from 1024 to 65535")
     task = read_task(arguments.task)
@@ -129,9 +85,6 @@ def live(arguments: argparse.Namespace) -> int:
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:
     """Drag and assess, with a progress bar."""
-    from wholebody.cli.tables import bar
-    from wholebody.tracking.dragging import drag_along, judge_drag
-
     with bar(label, len(places)) as tell:
         dragged = drag_along(problem, places, method, goal=goal, progress=lambda done: tell(done, label))
         tell(len(places), "judging every pair of every frame")
@@ -139,10 +92,6 @@ def followed(problem: Problem, places: Any, method: str, goal: int, label: str) 
 
 
 def _goal(problem: Problem, number: int | None) -> int:
-    from wholebody.base.errors import InputError
-    from wholebody.tasks import Frame, Orientation, Point
-    from wholebody.tracking.moving_goals import moving_goal
-
     if number is None:
         number = next((k for k, goal in enumerate(problem.goals) if isinstance(goal, (Point, Frame))), None)
         if number is None:
@@ -154,14 +103,6 @@ def _goal(problem: Problem, number: int | None) -> int:
 
 def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
     """Corners (k, 3) of the path, from the position of the dragged frame."""
-    import numpy as np
-
-    from wholebody.base.errors import FileFormatError
-    from wholebody.base.files import is_file
-    from wholebody.tasks.inputs import point
-    from wholebody.tracking.dragging import present_position, target_position
-    from wholebody.tracking.path_following import circle, read_path
-
     if arguments.path == "line":
         end = target_position(problem, goal) if arguments.to is None else point(arguments.to, "--to")
         way = end[None]
@@ -175,8 +116,6 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
 
 
 def _animation(task: Task, dragged: Dragged, path: Path) -> None:
-    from wholebody.cli.show import viewer_of
-
     with viewer_of(task.problem, task.view, task.title) as viewer:
         viewer.play(dragged, repeat=float("inf"))
         viewer.save(path)

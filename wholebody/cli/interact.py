@@ -3,44 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import gc
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import scene_names, scene_options
-from wholebody.cli.command import command
+from wholebody.base.checks import known
+from wholebody.base.files import check_writable, make_folder
+from wholebody.bench.rows import Row, chart
+from wholebody.bench.tables import machine, write_rows, write_text
+from wholebody.cli.arguments import scene_names
+from wholebody.cli.frames import frame_panels, is_held, loop_rows, paper_report
+from wholebody.cli.tables import bar, print_rows
+from wholebody.tracking import Judgement, Recording, follow, judge
+from wholebody.tracking.loop import OVERLAPS
+from wholebody.tracking.scenes import SCENES, InteractionScene, build_scene
+from wholebody.view import Viewer
 
-if TYPE_CHECKING:
-    from wholebody.bench.rows import Row
-    from wholebody.tracking import Judgement, Recording
-    from wholebody.tracking.scenes import InteractionScene
 
-
-@command(
-    "interact",
-    "follow a tracker frame by frame through a gallery without penetration",
-    """\
-Run a scene: a scripted tracker moves a hand or an avatar into walls, tables and itself, and the shown figure follows as
-far as contact allows. Print a table of times and remaining overlap, assessed independently. Write the numbers of every
-frame (CSV), a chart of the frame times (PNG, SVG) and the animation with the tracked posture as a ghost (HTML, opens
-without a network).""",
-    *scene_options("name of the scene, or all", "qp, ccd or all (default: qp)", "out/interact"),
-    epilog="""\
-examples:
-  wholebody interact --list
-  wholebody interact two_arms
-  wholebody interact all --out out/interact
-exit code: 1 if a frame overlaps by more than the tolerance, passes through something, or leaves a joint limit""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
-    from wholebody.base.checks import known
-    from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.tables import machine, write_text
-    from wholebody.cli.frames import is_held, paper_report
-    from wholebody.cli.tables import print_rows
-    from wholebody.tracking.loop import OVERLAPS
-    from wholebody.tracking.scenes import SCENES, build_scene
-
     names = scene_names(arguments, SCENES, "interact", files=False)
     if not names:
         return 0
@@ -61,14 +41,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run_one(scene: InteractionScene, overlap: str, seed: int, out: Path, facts: dict[str, str]) -> Row:
-    import gc
-
-    from wholebody.bench.rows import chart
-    from wholebody.bench.tables import write_rows
-    from wholebody.cli.frames import frame_panels, loop_rows
-    from wholebody.cli.tables import bar
-    from wholebody.tracking import follow, judge
-
     with bar(label := f"{scene.name}, {overlap}", len(scene.track)) as tell:
         gc.collect()
         gc.freeze()  # otherwise the garbage collector visits all objects once in a run, which delays a frame by 80 ms
@@ -88,8 +60,6 @@ def _run_one(scene: InteractionScene, overlap: str, seed: int, out: Path, facts:
 
 
 def _animation(scene: InteractionScene, recording: Recording, path: Path) -> None:
-    from wholebody.view import Viewer
-
     with Viewer(scene.scene, see_through=scene.see_through, title=scene.name) as viewer:
         viewer.look(eye=scene.eye, target=scene.target)
         viewer.play(recording, ghost=recording.tracked, repeat=float("inf"))

@@ -7,24 +7,16 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from importlib import import_module
 from io import TextIOWrapper, UnsupportedOperation
 from typing import Any
 
 from wholebody.base.errors import WholebodyError
 from wholebody.base.imports import raise_again
 from wholebody.cli.arguments import Parser
+from wholebody.cli.commands import COMMANDS
 from wholebody.version import __version__
-
-COMMANDS = {
-    **{name: f"{name}.run" for name in ("pose", "show", "figure")},
-    **{"demo": "demo.demo", "gallery": "demo.gallery"},
-    **{name: f"{name}.run" for name in ("interact", "drag", "world", "clip", "study", "reach", "assess", "bench")},
-    **{"doctor": "doctor.doctor", "completion": "doctor.completion"},
-}
-"""Where each command is: a module of this folder, and its name there."""
 
 DESCRIPTION = """\
 Pose people, avatars, hands and robots among objects, in contact and without penetration.
@@ -39,15 +31,14 @@ exit codes:
   2  the command, a task or another file is wrong; the message says what, where, and how to correct it"""
 
 
-def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
-    """Return the parser of some commands; it loads their modules alone."""
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
     shape = argparse.RawDescriptionHelpFormatter
     top = Parser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
     top.add_argument("--version", action="version", version=f"wholebody {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for name in names:
-        module, _, command = COMMANDS[name].partition(".")
-        getattr(import_module(f"wholebody.cli.{module}"), command).add_to(commands)
+    for command in COMMANDS:
+        command.add_to(commands)
     return top
 
 
@@ -79,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(given: list[str]) -> int:
-    arguments = parser([name for name in COMMANDS if name in given[:1]] or COMMANDS).parse_args(given)
+    arguments = parser().parse_args(given)
     raise_again()
     _tell_progress()
     with warnings.catch_warnings():

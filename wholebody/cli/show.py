@@ -6,27 +6,27 @@ import argparse
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from wholebody.base.errors import MissingPackageError
-from wholebody.cli.arguments import add_person, person_options
-from wholebody.cli.command import command, flag, option
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from wholebody.base.arrays import Array
-    from wholebody.problem import Problem
-    from wholebody.taskfile.task import View
-    from wholebody.view import Viewer
-    from wholebody.view.screenshot import Screenshots
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.files import checked_target
+from wholebody.cli.arguments import person_options
+from wholebody.figures import load
+from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
+from wholebody.taskfile import read_task, result
+from wholebody.taskfile.task import View
+from wholebody.view import Viewer
+from wholebody.view.screenshot import Screenshots
+from wholebody.view.viewer import SAVED
 
 
 def viewer_of(problem: Problem, view: View, title: str, **settings: Any) -> Viewer:
     """A viewer of the problem's scene with the task's camera; the settings are others of the viewer."""
-    from wholebody.view import Viewer
-
     viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **settings)
     if view.eye is not None:
         viewer.look(view.eye, view.target)
@@ -49,51 +49,12 @@ def draw(
     return written, ""
 
 
-LOCAL = "127.0.0.1"
-
-
-@command(
-    "show",
-    "show a figure, a task or a result",
-    """\
-Show in a browser. The command waits for the first tab, and ends when the last one is closed, or with Ctrl-C:
-
-  a figure   human, avatar, hand, or the path of a URDF
-  a task     the start of a task file, with its goals
-  a result   result.json, written by `wholebody pose`""",
-    option("what", metavar="FIGURE|TASK|RESULT", help="what to show"),
-    add_person,
-    option("--posture", metavar="NAME", help="name of a posture of the figure"),
-    flag("--pieces", "draw the pieces that contacts are measured with"),
-    option("--save", type=Path, metavar="FILE", help="write FILE.html, FILE.png or FILE.glb (glTF); open no browser"),
-    option("--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"),
-    option(
-        "--host",
-        default=LOCAL,
-        metavar="ADDRESS",
-        help=f"address of the live page (default: {LOCAL}; 0.0.0.0 allows access from other machines)",
-    ),
-    epilog="""\
-examples:
-  wholebody show human --posture sitting
-  wholebody show human --sex female --stature 1.55
-  wholebody show human --pieces                    # what contacts are measured with, instead of the body's surface
-  wholebody show out/shelf/result.json
-  wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
-  wholebody show shelf.toml --save shelf.png""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """Show, and wait until the first tab is opened and the last one is closed."""
-    from wholebody.base.errors import InputError
-    from wholebody.base.files import checked_target
-    from wholebody.cli.show import viewer_of
-    from wholebody.view.screenshot import Screenshots
-    from wholebody.view.viewer import SAVED
-
     save: Path | None = arguments.save
     if save is not None:
         checked_target(save, "--save", "a scene", SAVED)
-    if save is not None and (arguments.port or arguments.host != LOCAL):
+    if save is not None and (arguments.port or arguments.host != "127.0.0.1"):
         raise InputError("--port and --host are for the live page; leave them out beside --save")
     with Screenshots() as screenshots:
         if save is not None and save.suffix.lower() == ".png":
@@ -116,13 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np.float64], View, str]:
     """Problem, posture, view and title of the subject."""
-    from wholebody.base.errors import InputError
-    from wholebody.figures import load
-    from wholebody.problem import Problem
-    from wholebody.scene.scene import Scene
-    from wholebody.taskfile import read_task, result
-    from wholebody.taskfile.task import View
-
     path = Path(what)
     if options and path.suffix.lower() in (".json", ".toml"):
         raise InputError(f"{path} says which person it shows; leave out --{next(iter(options))}")

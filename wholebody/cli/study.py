@@ -1,4 +1,4 @@
-"""`wholebody study`: one task for many people, targets and layouts."""
+"""`wholebody study` and `reach`: one task for many people, targets and layouts; which places a frame reaches."""
 
 from __future__ import annotations
 
@@ -6,51 +6,20 @@ import argparse
 import sys
 from pathlib import Path
 
-from wholebody.cli.arguments import JOBS
-from wholebody.cli.command import command, option
+from rich.console import Console
+
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError
+from wholebody.base.files import make_folder
+from wholebody.cli.tables import console, table
+from wholebody.studies.reach_map import reach_map
+from wholebody.studies.study import study
+from wholebody.studies.study_files import read_study
+from wholebody.taskfile import read_task
 
 
-@command(
-    "study",
-    "solve one task for many people, targets and layouts",
-    """\
-Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
-
-  cases.csv         one row a case
-  records.jsonl     the same with the postures; an interrupted run continues from it""",
-    option("study", type=Path, metavar="FILE.toml", help="the study file"),
-    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
-    *JOBS,
-    epilog="""\
-a study file:
-  task = "shelf.toml"                     # relative to the study file
-
-  [[person]]
-  name = "small woman"
-  sex = "female"
-  stature = 1.53
-
-  [[target]]                              # of the task's first goal of type point or frame
-  name = "upper board"
-  at = [0.45, -0.20, 1.45]
-
-  [[layout]]
-  name = "nearer"
-  move = { shelf = [0.55, 0.0, 0.0] }     # things of the task
-
-examples:
-  wholebody study shelf-study.toml --jobs 2
-  wholebody study shelf-study.toml --out results/study""",
-)
-def run(arguments: argparse.Namespace) -> int:
+def run_study(arguments: argparse.Namespace) -> int:
     """Solve, report and write; 1 if a case is not solved."""
-    from rich.console import Console
-
-    from wholebody.base.files import make_folder
-    from wholebody.cli.tables import console, table
-    from wholebody.studies.study import study
-    from wholebody.studies.study_files import read_study
-
     asked = read_study(arguments.study)
     out = arguments.out or Path("out") / arguments.study.stem
     make_folder(out)
@@ -71,3 +40,35 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"{one.name}: {one.message}", file=sys.stderr)
     print(f"wrote {records.to_csv(out / 'cases.csv')}")
     return 0 if all(one.solved for one in records) else 1
+
+
+def run_reach(arguments: argparse.Namespace) -> int:
+    """Search and write; 1 if no place is reached."""
+    low, high = _numbers(arguments.low, "--low"), _numbers(arguments.high, "--high")
+    step = _numbers(arguments.step, "--step") if "," in arguments.step else _numbers(arguments.step, "--step", 1)[0]
+    task = read_task(arguments.task)
+    task.problem.retarget([])
+    out = arguments.out or Path("out") / arguments.task.stem
+    make_folder(out)
+    with Console(stderr=True).status("searching") as status:
+        found = reach_map(
+            task.problem, arguments.frame, low, high, step, jobs=arguments.at_once, cluster=arguments.cluster,
+            progress=lambda done, total: status.update(f"{done} of {total} places"),
+        )  # fmt: skip
+    print(found)
+    for write, name in ((found.picture, "png"), (found.html, "html"), (found.save, "npz"), (found.to_vtk, "vtk")):
+        print(f"wrote {write(out / f'reach.{name}')}")
+    return 0 if found.reached.any() else 1
+
+
+def _numbers(text: str, what: str, count: int = 3) -> list[float]:
+    """Numbers separated by commas; raises InputError where they are something else."""
+    parts = text.split(",")
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count:
+        wanted = "a number" if count == 1 else f"{count} numbers with commas, such as 0.2,-0.5,0.9"
+        raise InputError(f"{what} is {shown(text)}; give {wanted}")
+    return numbers

@@ -3,65 +3,34 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from wholebody.base.arrays import Array
 from wholebody.base.checks import choice, known
 from wholebody.base.errors import InputError
-from wholebody.cli.arguments import scene_names, scene_options
-from wholebody.cli.command import command, flag, option
+from wholebody.base.files import check_writable, make_folder, title_of
+from wholebody.bench.rows import Row, chart
+from wholebody.bench.tables import machine, write_rows, write_text
+from wholebody.cli.arguments import scene_names
+from wholebody.cli.frames import frame_panels, moments, paper_report, world_rows
+from wholebody.cli.tables import bar, print_rows
+from wholebody.dynamics.live_world import LiveWorld
+from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_world_scene, standing_scene
+from wholebody.taskfile import read_task
+from wholebody.tracking.loop import OVERLAPS
+from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
+from wholebody.tracking.receiver import Receiver
+from wholebody.tracking.scenes import InteractionScene
+from wholebody.view import Viewer
+from wholebody.view.live_page import LivePage
+from wholebody.view.side_by_side import write_filmstrip
+from wholebody.view.viewed_scene import ViewedWorld
 
-if TYPE_CHECKING:
-    from wholebody.base.arrays import Array
-    from wholebody.bench.rows import Row
-    from wholebody.dynamics.world import WorldFrame
-    from wholebody.tracking.overlaps import Overlap
-    from wholebody.tracking.scenes import InteractionScene
 
-
-@command(
-    "world",
-    "let a hand or an avatar meet balls, boxes and dominoes that move by themselves",
-    """\
-Run a scene: a scripted tracker moves a hand or an avatar, and the things that it meets fall, roll, slide and bounce.
-With a task file the figure stands as the file starts. Print a table of frame times, impacts and overlap. Write the
-numbers of every frame (CSV), a chart of the energy and the frame times (PNG, SVG) and the animation (HTML, opens
-without a network).""",
-    *scene_options(
-        "name of the scene, or all; or a task file whose objects have a density or a mass",
-        "qp or ccd (default: qp)",
-        "out/world",
-    ),
-    option(
-        "--give-way", default="figure", metavar="WHO", help="figure or both: who takes an overlap (default: figure)"
-    ),
-    flag("--picture", "draw five moments too, by a headless Chromium"),
-    flag("--live", "open a page instead: drag handles and things with the mouse, and throw them (needs viser)"),
-    option("--port", type=int, metavar="N", help="of the live page (default: 8080)"),
-    option("--udp", type=int, metavar="N", help="port at which places of handles arrive for the live page"),
-    epilog="""\
---live runs the scene in a browser without its script: the figure follows its handles, a thing that is let go flies on.
-Datagrams to the port of --udp move handles too: {"head_top": [0.1, 0.0, 1.7], "right_palm": [0.4, -0.2, 1.1]}, metres.
-
-examples:
-  wholebody world --list
-  wholebody world flick
-  wholebody world my_task.toml --frames 300
-  wholebody world room --live --udp 9870
-  wholebody world all --out out/world
-exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
-    from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.tables import machine, write_text
-    from wholebody.cli.frames import paper_report
-    from wholebody.cli.tables import print_rows
-    from wholebody.dynamics.world import WORLD_SCENES
-    from wholebody.tracking.loop import OVERLAPS
-    from wholebody.tracking.overlaps import GIVE_WAY
-
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
     if not names:
         return 0
@@ -86,10 +55,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
     """Let figure and things be dragged in a browser until Ctrl-C."""
-    from wholebody.dynamics.live_world import LiveWorld
-    from wholebody.tracking.receiver import Receiver
-    from wholebody.view.live_page import LivePage
-
     live = LiveWorld(scene.scene, scene.track.q[0], give_way=arguments.give_way)
     receiver = None if arguments.udp is None else Receiver(arguments.udp, live.handles)
     seen = {""}
@@ -112,10 +77,6 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
 
 def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
     """The scene of a name, or that of a task file, whose figure stands as the file starts."""
-    from wholebody.base.files import title_of
-    from wholebody.dynamics.world import build_world_scene, standing_scene
-    from wholebody.taskfile import read_task
-
     if name.endswith(".toml"):
         problem = read_task(name).problem
         # frames of a task file
@@ -124,13 +85,6 @@ def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
 
 
 def _run_one(scene: InteractionScene, arguments: argparse.Namespace, facts: dict[str, str]) -> Row:
-    from wholebody.bench.rows import chart
-    from wholebody.bench.tables import write_rows
-    from wholebody.cli.frames import frame_panels, world_rows
-    from wholebody.cli.tables import bar
-    from wholebody.dynamics.world import World
-    from wholebody.tracking.overlaps import overlaps
-
     name = scene.name
     frames: list[WorldFrame] = []
     pushed: list[tuple[Overlap, ...]] = []
@@ -157,13 +111,6 @@ def _animation(
     scene: InteractionScene, frames: list[WorldFrame], pushed: list[tuple[Overlap, ...]], out: Path, picture: bool
 ) -> list[float]:
     """Write the animation, with PD_g of what the spring wanted; the seconds that each frame takes to draw."""
-    import time
-
-    from wholebody.cli.frames import moments
-    from wholebody.view import Viewer
-    from wholebody.view.side_by_side import write_filmstrip
-    from wholebody.view.viewed_scene import ViewedWorld
-
     viewed = ViewedWorld(scene.scene, frames[-1].placements)
     postures = [viewed.configuration(frame.q, frame.placements) for frame in frames]
     with Viewer(viewed, contact_distance=0.0, see_through=scene.see_through, title=scene.name) as viewer:

@@ -72,11 +72,24 @@ def use_tool(name: str) -> str:
     return path
 
 
+def look_at_cache(_: str) -> str:
+    """Say what the cache of mesh pieces holds."""
+    from wholebody.geometry.mesh_cache import LARGEST_CACHE, cache_state
+
+    state = cache_state()
+    size, most = state.size / 2**20, LARGEST_CACHE // 2**20
+    held = f"{state.entries} meshes, {size:.1f} of at most {most} MB, in {state.folder}"
+    if not state.writable:
+        raise PermissionError(f"{held}, which cannot be written: pieces of meshes are made anew each time")
+    return held
+
+
 CHECKS: dict[str, Callable[[str], str]] = {
     "import": lambda name: str(import_module(name).__file__),
     "program": solve_program,
     "pose": pose_person,
     "tool": use_tool,
+    "cache": look_at_cache,
 }
 
 

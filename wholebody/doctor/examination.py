@@ -122,14 +122,10 @@ def _tools() -> Iterator[Entry]:
 
 
 def _cache() -> Entry:
-    from wholebody.geometry.mesh_cache import LARGEST_CACHE, VARIABLE, cache_state
-
-    state = cache_state()
-    held = f"{state.entries} meshes, {state.size / 2**20:.1f} of at most {LARGEST_CACHE // 2**20} MB, in {state.folder}"
-    if state.writable:
-        return Entry("cache", "convex pieces", "works", held, False)
-    detail = f"{held}, which cannot be written: pieces of meshes are made anew each time"
-    return Entry("cache", "convex pieces", "absent", detail, False, f"let {VARIABLE} name a folder that can be written")
+    outcome = checks.run("cache", ["convex pieces"])["convex pieces"]
+    state: State = "works" if outcome.works else "absent"
+    repair = "" if outcome.works else "let WHOLEBODY_CACHE name a folder that can be written"
+    return Entry("cache", "convex pieces", state, outcome.detail, False, repair)
 
 
 def _faults(have: Mapping[str, Distribution], environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:

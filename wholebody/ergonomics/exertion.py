@@ -20,7 +20,7 @@ from wholebody.figures.state import State
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import ComputedTogether, Surroundings, Term, filled
+from wholebody.tasks.base import ComputedTogether, Term, filled
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.forces import GRAVITY, Force, Forces, Loads, point_rows, pressure, resolved
 
@@ -142,7 +142,7 @@ class Statics(NamedTuple):
         return (whole - ROUND) / LEVER - float(force @ unit), moment @ d_moment / (whole * LEVER) - force @ d_unit
 
 
-def statics_of(scene: Surroundings, term: _HeldPerson) -> Statics:
+def statics_of(scene: Scene, term: _HeldPerson) -> Statics:
     """What holds a scene's person, or one of several, under forces; standing, on both soles."""
     where, forces, person, standing = type(term).__name__, term.forces, term.person, term.standing
     joined, prefix = scene.figure, ""
@@ -186,7 +186,7 @@ class _HeldPerson(Term):
     person: str = ""
     statics: Statics = field(init=False, repr=False)
 
-    def resolve(self: _T, scene: Surroundings, start: Array) -> _T:
+    def resolve(self: _T, scene: Scene, start: Array) -> _T:
         """Look up the joints and their strength."""
         return filled(self, statics=statics_of(scene, self))
 

@@ -17,7 +17,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.base import Constraint, filled
 
 EYES = "gaze"  # frame between the eyes; its x axis points ahead
 RAY = 1e-3  # m: radius of a line of sight
@@ -219,7 +219,7 @@ class Look(Constraint):
     eyes: inputs.Name = EYES
     place: inputs.Place = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Look:
+    def resolve(self, scene: Scene, start: Array) -> Look:
         """Find the eyes."""
         return filled(self, place=inputs.find_place(scene, self.eyes, "Look"))
 

@@ -15,7 +15,7 @@ from wholebody.figures.adjustable import ADJUSTABLE
 from wholebody.geometry.placement import placement
 from wholebody.methods import METHODS
 from wholebody.problem import Problem
-from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Key, Table, Text
+from wholebody.taskfile.kinds import FLAG, PLACEMENT, POSITION, TEXT, ByName, Key, Table, choice
 from wholebody.taskfile.reading import Contents, Entry, contents_of, read_contents
 from wholebody.taskfile.schema import FIGURES
 from wholebody.taskfile.task import task_from
@@ -110,11 +110,11 @@ class TaskFile:
         return dict(layout)
 
 
-_TOP = (Key("task", Text(), True), Key("method", Choice(tuple(METHODS))), Key("warm_start", Flag()))
-_NAME = Key("name", Text(), True)
+_TOP = (Key("task", TEXT, True), Key("method", choice(METHODS)), Key("warm_start", FLAG))
+_NAME = Key("name", TEXT, True)
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
 _TABLES = {
-    "person": Table((_NAME, Key("called", Text()), *FIGURES["human"].keys), True),
+    "person": Table((_NAME, Key("called", TEXT), *FIGURES["human"].keys), True),
     "target": Table((_NAME, Key("at", POSITION, True)), True),
     "layout": Table((_NAME, Key("move", _PLACES, True)), True),
 }

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from wholebody.base import fields
-from wholebody.base.checks import color, flag, plain, shown, text, unit_hint
-from wholebody.base.errors import InputError, UnknownNameError, either
+from wholebody.base.checks import color, flag, plain, shown, text
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError, either
 from wholebody.base.fields import Check, Range, Vector, check_of
 from wholebody.figures.anthropometry import DIMENSION
 from wholebody.figures.figure import Figure
@@ -20,47 +19,63 @@ from wholebody.tasks import inputs
 from wholebody.tasks.inputs import FARTHEST
 
 
-class Kind(ABC):
+class Kind(Protocol):
     """The values that a key accepts."""
 
     @property
-    @abstractmethod
     def words(self) -> str:
         """The accepted values in words, for the documentation and for errors."""
 
-    @abstractmethod
     def read(self, value: Any, where: Where) -> Any:
         """Return the value in the form that Python code takes."""
 
-    def names(self, value: Any, figure: Figure, where: Where) -> None:  # noqa: B027 - most kinds name nothing
+    def names(self, value: Any, figure: Figure, where: Where) -> None:
         """Check names against the figure."""
 
 
-@dataclass(frozen=True)
-class Number(Kind):
-    """A finite number within a range."""
+class Nameless:
+    """Base of kinds whose values name nothing of a figure."""
 
-    range: Range
-
-    @property
-    def words(self) -> str:
-        """Range and unit."""
-        ends = f"from {plain(self.range.low)} to {plain(self.range.high)} {self.range.unit}"
-        return f"{'whole number' if self.range.whole else 'number'} {ends}".strip()
-
-    def read(self, value: Any, where: Where) -> float:
-        """Return the number."""
-        low, high = self.range.low, self.range.high
-        if isinstance(value, bool) or not isinstance(value, int if self.range.whole else (int, float)):
-            raise where.fault(f"{shown(value)} is not a {self.words}; write a plain number")
-        if not low <= value <= high:
-            hint = unit_hint(value, low, high, self.range.unit) or "; change it"
-            raise where.fault(f"{shown(value)} is not a {self.words}{hint}")
-        return value if self.range.whole else float(value)
+    def names(self, value: Any, figure: Figure, where: Where) -> None:
+        """Check nothing."""
 
 
 @dataclass(frozen=True)
-class Numbers(Kind):
+class Value(Nameless):
+    """What a check accepts, as it is in Python."""
+
+    words: str
+    check: Check
+
+    def read(self, value: Any, where: Where) -> Any:
+        """Return what the check returns."""
+        try:
+            return self.check(value, "")
+        except InputError as error:
+            raise FileFormatError(f"{where}{error}") from None
+
+
+def _text(value: object, what: str) -> str:
+    """Any text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{what} is {shown(value)}; give a text, in quotes")
+    return value
+
+
+def number(within: Range) -> Value:
+    """A number within a range."""
+    ends = f"from {plain(within.low)} to {plain(within.high)} {within.unit}"
+    return Value(f"{'whole number' if within.whole else 'number'} {ends}".strip(), within)
+
+
+def choice(options: Iterable[str]) -> Value:
+    """One of a few words."""
+    words = tuple(options)
+    return Value(either(f'"{word}"' for word in words), fields.Choice(words))
+
+
+@dataclass(frozen=True)
+class Numbers(Nameless):
     """A fixed count of numbers of one range."""
 
     vector: Vector
@@ -74,13 +89,13 @@ class Numbers(Kind):
 
     def read(self, value: Any, where: Where) -> tuple[float, ...]:
         """Return the numbers."""
-        count, each = self.vector.count, Number(self.vector.each)
+        count, each = self.vector.count, number(self.vector.each)
         if not isinstance(value, list) or len(value) != count:
             raise where.fault(f"{shown(value)} is not {self.words}; write {count} numbers in brackets")
         return tuple(each.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
 
 
-class Placement(Kind):
+class Placement(Nameless):
     """Position, or position and orientation."""
 
     words = "[x, y, z], [x, y, z, qx, qy, qz, qw] or a 4x4 matrix, m"
@@ -97,67 +112,8 @@ class Placement(Kind):
         raise where.fault(f"{shown(value)} is no place; write {self.words}")
 
 
-class Color(Kind):
-    """Numbers, a name or a hexadecimal code."""
-
-    words = 'red, green, blue and, if given, alpha, each from 0 to 1; a name such as "steelblue"; or "#rrggbb"'
-
-    def read(self, value: Any, where: Where) -> tuple[float, float, float, float]:
-        """Return red, green, blue and alpha."""
-        try:
-            return color(tuple(value) if isinstance(value, list) else value, "color")
-        except InputError:
-            raise where.fault(f"{shown(value)} is not {self.words}; write one of these") from None
-
-
 @dataclass(frozen=True)
-class Text(Kind):
-    """Any text that is not empty."""
-
-    @property
-    def words(self) -> str:
-        """Return "text"."""
-        return "text"
-
-    def read(self, value: Any, where: Where) -> str:
-        """Return the text."""
-        if not isinstance(value, str) or not value.strip():
-            raise where.fault(f"{shown(value)} is not a text; write it in quotes")
-        return value
-
-
-@dataclass(frozen=True)
-class Choice(Kind):
-    """One of a few words."""
-
-    options: tuple[str, ...]
-
-    @property
-    def words(self) -> str:
-        """The words."""
-        return either(f'"{option}"' for option in self.options)
-
-    def read(self, value: Any, where: Where) -> str:
-        """Return the word."""
-        if value not in self.options:
-            raise where.fault(f"{shown(value)} is not {self.words}; write one of them")
-        return str(value)
-
-
-class Flag(Kind):
-    """True or false."""
-
-    words = "true or false"
-
-    def read(self, value: Any, where: Where) -> bool:
-        """Return the flag."""
-        if not isinstance(value, bool):
-            raise where.fault(f"{shown(value)} is not {self.words}; write one of them, without quotes")
-        return value
-
-
-@dataclass(frozen=True)
-class Name(Text):
+class Name:
     """A name that the figure knows."""
 
     noun: str
@@ -168,6 +124,11 @@ class Name(Text):
         """The kind of object that is named."""
         return f"name of a {self.noun}"
 
+    def read(self, value: Any, where: Where) -> str:
+        """Return the name."""
+        name: str = TEXT.read(value, where)
+        return name
+
     def names(self, value: Any, figure: Figure, where: Where) -> None:
         """Look the name up."""
         known = list(self.known(figure))
@@ -176,7 +137,7 @@ class Name(Text):
 
 
 @dataclass(frozen=True)
-class Several(Kind):
+class Several:
     """One or more values of one kind."""
 
     kind: Kind
@@ -188,7 +149,8 @@ class Several(Kind):
         """The list and its entries."""
         if self.example:
             return f"list such as {self.example}"
-        return f"list, each a {self.kind.words}" if isinstance(self.kind, Text) else f"list, each {self.kind.words}"
+        article = "a " if isinstance(self.kind, Name) or self.kind is TEXT else ""
+        return f"list, each {article}{self.kind.words}"
 
     def read(self, value: Any, where: Where) -> list[Any]:
         """Return the list."""
@@ -204,7 +166,7 @@ class Several(Kind):
 
 
 @dataclass(frozen=True)
-class ByName(Kind):
+class ByName:
     """Values by name, which whoever uses them looks up."""
 
     kind: Kind  # of the values
@@ -232,7 +194,7 @@ class ByName(Kind):
 
 
 @dataclass(frozen=True)
-class Part(Kind):
+class Part:
     """A table in braces, within a value, that makes an object."""
 
     noun: str
@@ -254,8 +216,8 @@ class Part(Kind):
             choices = either(f'{self.chooser} = "{name}"' for name in self.forms)
             raise where.fault(f"the {self.noun} has no {self.chooser}; write {choices}")
         data = {name: entry for name, entry in value.items() if name != self.chooser}
-        choice = Choice(tuple(self.forms))
-        form = self.forms[choice.read(value[self.chooser], where.at(self.chooser)) if self.chooser else ""]
+        chosen = choice(self.forms)
+        form = self.forms[chosen.read(value[self.chooser], where.at(self.chooser)) if self.chooser else ""]
         assert form.make is not None
         read = values_of(data, form.keys, where)
         try:
@@ -270,6 +232,11 @@ class Part(Kind):
                 key.kind.names(found, figure, where.at(key.name))
 
 
+TEXT = Value("text", _text)
+FLAG = Value("true or false", flag)
+COLOR = Value(
+    'red, green, blue and, if given, alpha, each from 0 to 1; a name such as "steelblue"; or "#rrggbb"', color
+)
 POSITION = Numbers(Vector(3, Range(-FARTHEST, FARTHEST, "m")), "[x, y, z]")
 DIRECTION = Numbers(Vector(3, Range(-1e6, 1e6)), "[x, y, z], any length")
 PLACEMENT = Placement()
@@ -281,9 +248,9 @@ FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.
 SEGMENT = Name("segment", lambda figure: figure.segments)
 MEMBER = Name("figure", lambda figure: figure.members)
 POSTURE = Name("posture", lambda figure: figure.postures)
-PROPORTIONS = ByName(Number(DIMENSION), "dimensions", "sitting_height = 0.93", "m")
+PROPORTIONS = ByName(number(DIMENSION), "dimensions", "sitting_height = 0.93", "m")
 JOINT_VALUES = ByName(
-    Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad")), "joints", "left_elbow_flexion = 0.5",
+    number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad")), "joints", "left_elbow_flexion = 0.5",
     "rad (m for sliding joints)", JOINT,
 )  # fmt: skip
 ROOT_PLACES = ByName(PLACEMENT, "free roots", '"anna/root" = [0.0, 0.0, 0.93]', "m", ROOT)
@@ -296,9 +263,9 @@ _OF_CHECKS: dict[Check, Kind] = {
     unit_vector: DIRECTION,
     inputs.target_placement: PLACEMENT,
     inputs.target_rotation: QUATERNION,
-    flag: Flag(),
-    inputs.name: Text(),
-    text: Text(),
+    flag: FLAG,
+    inputs.name: TEXT,
+    text: TEXT,
 }
 
 
@@ -306,10 +273,10 @@ def kind_of(record: type, field: str) -> Kind:
     """The values that a field of a class accepts, as they are written in a file."""
     check = check_of(record, field)
     if isinstance(check, Range):
-        return Number(check)
+        return number(check)
     if isinstance(check, Vector):
         return Numbers(check)
-    return Choice(tuple(check.options)) if isinstance(check, fields.Choice) else _OF_CHECKS[check]
+    return choice(check.options) if isinstance(check, fields.Choice) else _OF_CHECKS[check]
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,20 @@ from wholebody.tasks.base import (
     Term as Term,
 )
 from wholebody.tasks.bounds import Freeze as Freeze, StepLimit as StepLimit
-from wholebody.tasks.discomfort import Discomfort as Discomfort
-from wholebody.tasks.distance import Displacement as Displacement, Effort as Effort, RotationEffort as RotationEffort
+from wholebody.tasks.discomfort import Discomfort as Discomfort, PotentialEnergy as PotentialEnergy
+from wholebody.tasks.distance import (
+    Displacement as Displacement,
+    Effort as Effort,
+    RotationEffort as RotationEffort,
+    Soft as Soft,
+)
 from wholebody.tasks.forces import Force as Force
 from wholebody.tasks.frame import Frame as Frame, Hold as Hold, Orientation as Orientation, Relative as Relative
 from wholebody.tasks.grasp import Grasp as Grasp
-from wholebody.tasks.hang import Hang as Hang
 from wholebody.tasks.point import CenterOfMass as CenterOfMass, Plane as Plane, Point as Point
 from wholebody.tasks.posture import Posture as Posture
-from wholebody.tasks.potential_energy import PotentialEnergy as PotentialEnergy
 from wholebody.tasks.range_of_motion import RangeOfMotion as RangeOfMotion, ReachCones as ReachCones
 from wholebody.tasks.rhythm import Rhythm as Rhythm
 from wholebody.tasks.sit import Sit as Sit
-from wholebody.tasks.soft import Soft as Soft
-from wholebody.tasks.stand import Stance as Stance, Stand as Stand
+from wholebody.tasks.stand import Hang as Hang, Stance as Stance, Stand as Stand
 from wholebody.tasks.touch import Lean as Lean, Touch as Touch

@@ -21,8 +21,9 @@ from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import called
 from wholebody.figures.state import State, Wrench
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.base import Goal, filled
 
 STEEPEST = pi / sin(pi / 180.0)
 """Largest derivative across the error, reached one degree before the opposite direction.
@@ -78,7 +79,7 @@ class Axis(Goal):
         settle(self, "basis", across(np.asarray(self.axis)))
         settle(self, "resolved_target", self.toward if self.direction is None else self.direction)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Axis:
+    def resolve(self, scene: Scene, start: Array) -> Axis:
         """Find the frame."""
         return filled(self, place=inputs.find_place(scene, self.frame, "Axis"))
 

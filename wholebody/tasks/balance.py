@@ -17,8 +17,9 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
 from wholebody.geometry.pieces import swept_points
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.base import Constraint, filled
 from wholebody.tasks.surfaces import outermost
 
 STANDING_HEIGHT = 0.01
@@ -49,12 +50,12 @@ class _Soles(NamedTuple):
     ellipsoids: list[tuple[int, Any, pin.SE3]]  # place of the point, shape, and where it is
 
 
-def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
+def standing_points(scene: Scene, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet, toes included, stand at q: the lowest corners of their pieces."""
     return standing_corners(scene, q, feet)[0]
 
 
-def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
+def standing_corners(scene: Scene, q: Array, feet: Sequence[str]) -> tuple[Array, Indices]:
     """The same, and the joints (n,) that carry them."""
     joints = tuple([place.joint for place in inputs.find_feet(scene, feet, "Balance")])
     soles = inputs.once(scene, ("soles", joints), partial(_soles_of, scene, feet, joints))
@@ -68,7 +69,7 @@ def standing_corners(scene: Surroundings, q: Array, feet: Sequence[str]) -> tupl
     return points[low], soles.joints[low]
 
 
-def _soles_of(scene: Surroundings, feet: Sequence[str], bearing: Sequence[int]) -> _Soles:
+def _soles_of(scene: Scene, feet: Sequence[str], bearing: Sequence[int]) -> _Soles:
     points, radii, joints, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
     ellipsoids: list[tuple[int, Any, pin.SE3]] = []
     for number, (name, joint) in enumerate(zip(feet, bearing, strict=True)):
@@ -260,11 +261,11 @@ class Balance(Constraint):
     normals: Array = field(init=False, repr=False)  # (m, 2) unit normals of the edges of the support polygon, inward
     offsets: Array = field(init=False, repr=False)  # (m,) of the edges: inside, normals @ x >= offsets [m]
 
-    def resolve(self, scene: Surroundings, start: Array) -> Balance:
+    def resolve(self, scene: Scene, start: Array) -> Balance:
         """Compute the support polygon at the start."""
         return self.on_points(standing_points(scene, start, self.feet), scene)
 
-    def on_points(self, points: Array, scene: Surroundings, steady: bool = False) -> Balance:
+    def on_points(self, points: Array, scene: Scene, steady: bool = False) -> Balance:
         """Copy that is ready to be evaluated, on points (n, 3) of the soles; if `steady`, with that as its margin."""
         joints, sole = inputs.joints_with_mass(scene, "Balance", self.feet), convex_polygon(points)
         margin = STEADY * sole.width if steady else self.margin

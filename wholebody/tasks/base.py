@@ -12,46 +12,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State, Wrench
+from wholebody.scene.scene import Scene
 from wholebody.tasks import answers
-
-if TYPE_CHECKING:
-    from wholebody.figures.figure import Figure
-
 
 _T = TypeVar("_T")
 
 MOST_PLANES = 1 << 16  # more than one term ever has
-
-
-class Surroundings(Protocol):
-    """The part of a scene that a term uses."""
-
-    @property
-    def figure(self) -> Figure:
-        """The figure."""
-
-    @property
-    def model(self) -> Any:
-        """Its pin.Model."""
-
-    @property
-    def geometry(self) -> Any:
-        """The pin.GeometryModel with all pieces."""
-
-    @property
-    def piece_owner(self) -> tuple[str, ...]:
-        """The segment or thing that every piece is part of."""
-
-    @property
-    def built(self) -> Any:
-        """The geometry model with its indices; see `SceneGeometry.known`."""
 
 
 def filled(term: _T, **values: object) -> _T:
@@ -103,7 +76,7 @@ class Term(Checked):
         """Pairs of segments and things that the term brings together: their clearance is zero; once resolved."""
         return ()
 
-    def resolve(self: _T, scene: Surroundings, start: Array) -> _T:
+    def resolve(self: _T, scene: Scene, start: Array) -> _T:
         """Copy of the term that is ready to be evaluated on the scene; `start` (nq,) is that of the problem."""
         return self
 

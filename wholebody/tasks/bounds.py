@@ -15,8 +15,9 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Bound, Surroundings, filled
+from wholebody.tasks.base import Bound, filled
 
 SPEED = Range(1e-9, 1e9, endless=True)  # rad/s, m/s
 Speed: TypeAlias = Annotated[float, SPEED]
@@ -50,7 +51,7 @@ class Freeze(Bound):
         """Return the call that builds it."""
         return f"Freeze({', '.join(map(repr, self.joints))})"
 
-    def resolve(self, scene: Surroundings, start: Array) -> Freeze:
+    def resolve(self, scene: Scene, start: Array) -> Freeze:
         """Find the joints."""
         upper = np.full(scene.model.nv, np.inf)
         upper[inputs.find_dofs(scene, self.joints, "Freeze")] = 0.0
@@ -98,7 +99,7 @@ class StepLimit(Bound):
             warn_of_degrees(speed, f"StepLimit: {name}", FASTEST_TURN, "rad/s")
         object.__setattr__(self, "joints", speeds)
 
-    def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
+    def resolve(self, scene: Scene, start: Array) -> StepLimit:
         """Find the joints."""
         velocity = np.full(scene.model.nv, self.velocity)
         for name in scene.figure.roots:

@@ -15,8 +15,9 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, TermError, UndefinedTermError, either
 from wholebody.figures.state import UNIT_TOLERANCE, State, Wrench
 from wholebody.geometry.placement import FARTHEST
+from wholebody.scene.scene import Scene
 from wholebody.tasks import answers
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 
 T = TypeVar("T")
 
@@ -143,7 +144,7 @@ def check_own(state: State, **groups: Iterable[Any]) -> None:
                 check_rows(f"{name}[{number}]", term, term.error if name == "goals" else term.value, state)
 
 
-def check_frozen(bounds: Iterable[Bound], scene: Surroundings, state: State) -> None:
+def check_frozen(bounds: Iterable[Bound], scene: Scene, state: State) -> None:
     """Raise InputError if a bound keeps a joint out of its limits where a state is."""
     least, most = scene.figure.tangent_bounds(state.q)
     for bound in bounds:
@@ -155,7 +156,7 @@ def check_frozen(bounds: Iterable[Bound], scene: Surroundings, state: State) -> 
             raise InputError(f"{message}, out of its limits; start it within them")
 
 
-def start_posture(scene: Surroundings, start: Array | str | Mapping[str, Array | str] | None) -> Array:
+def start_posture(scene: Scene, start: Array | str | Mapping[str, Array | str] | None) -> Array:
     """The posture (nq,) that a problem starts at, of unit quaternions; InputError for anything else."""
     figure = scene.figure
     if start is None or isinstance(start, (str, Mapping)):

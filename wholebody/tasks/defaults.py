@@ -9,20 +9,20 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, standing_points
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.checks import is_a
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
-from wholebody.tasks.hang import Hang
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
-from wholebody.tasks.stand import Stance, Stand
+from wholebody.tasks.stand import Hang, Stance, Stand
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
@@ -34,7 +34,7 @@ _effort, _rhythm = Effort(), Rhythm()
 
 
 def usual_measures(
-    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound],
+    scene: Scene, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound],
     stands: Sequence[str], *, ranges: bool,
 ) -> tuple[Measure, ...]:  # fmt: skip
     """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known.
@@ -54,7 +54,7 @@ def usual_measures(
 
 
 def default_measures(
-    scene: Surroundings,
+    scene: Scene,
     start: Array,
     stances: Sequence[tuple[str, ...]],
     seated: Sequence[str],
@@ -84,19 +84,19 @@ def default_measures(
     return (_effort.resolve(scene, rest), rhythm, *(kept(Stance, pair) for pair in pairs), *free)
 
 
-def _places(scene: Surroundings, bodies: Sequence[str]) -> frozenset[int]:
+def _places(scene: Scene, bodies: Sequence[str]) -> frozenset[int]:
     """First places in the tangent of the joints of persons."""
     return frozenset(int(scene.model.joints[joint].idx_v) for body in bodies for joint in scene.figure.bodies[body])
 
 
-def seated(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
+def seated(scene: Scene, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The persons who sit on something, by what their names begin with."""
     return tuple(body for term in terms if is_a(term, (Sit,))
                  if (body := inputs.body_of(scene, [term.frame])) is not None)  # fmt: skip
 
 
 def free_arms(
-    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], up: Set[str | None]
+    scene: Scene, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], up: Set[str | None]
 ) -> tuple[str, ...]:
     """The upper arms that no term moves, of the persons `up` who stand or kneel."""
     if not up:
@@ -114,7 +114,7 @@ def free_arms(
     return inputs.once(scene, key, partial(_free_arms, scene, up, bearing, moved))
 
 
-def _free_arms(scene: Surroundings, up: Set[str | None], bearing: Set[int], moved: Set[int]) -> tuple[str, ...]:
+def _free_arms(scene: Scene, up: Set[str | None], bearing: Set[int], moved: Set[int]) -> tuple[str, ...]:
     """The upper arms of persons without the joints that carry some joints, and without some places in the tangent."""
     figure, joints = scene.figure, [scene.model.joints[one] for joint in bearing for one in scene.model.supports[joint]]
     moved = set(moved).union(*(range(one.idx_v, one.idx_v + one.nv) for one in joints))
@@ -123,7 +123,7 @@ def _free_arms(scene: Surroundings, up: Set[str | None], bearing: Set[int], move
     return tuple(f"{arm}_upper_arm" for arm in known if moved.isdisjoint(figure.dofs(f"{arm}_arm").tolist()))
 
 
-def _bearing(scene: Surroundings, term: Constraint | Goal) -> tuple[int, ...]:
+def _bearing(scene: Scene, term: Constraint | Goal) -> tuple[int, ...]:
     """Joints that a resolved term moves; of a balance, which all masses move, what bears it. Empty: not known."""
     if is_a(term, UPRIGHT):
         loads = term.loads.places if isinstance(term, LoadedBalance) else ()
@@ -149,7 +149,7 @@ def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
     )
 
 
-def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
+def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
     """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on."""
 
     def kneels(stand: Stand) -> bool:
@@ -165,7 +165,7 @@ def stances(scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal
     return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
 
 
-def _kneeling(scene: Surroundings, start: Array, shanks: Set[str]) -> Array:
+def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:
     """The start (nq,) with the legs and the height of one who kneels on some shanks, upright and facing as there."""
     figure, q = scene.figure, start.copy()
     for body in {shank.removesuffix("shank").removesuffix("left_").removesuffix("right_") for shank in shanks}:
@@ -183,7 +183,7 @@ def _kneeling(scene: Surroundings, start: Array, shanks: Set[str]) -> Array:
 
 
 def default_constraints(
-    scene: Surroundings, start: Array, known: Set[type], *, ranges: bool, standing: Sequence[str], required: bool
+    scene: Scene, start: Array, known: Set[type], *, ranges: bool, standing: Sequence[str], required: bool
 ) -> tuple[tuple[Constraint, ...], str]:
     """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
 
@@ -211,7 +211,7 @@ def default_constraints(
 
 
 def standing(
-    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
+    scene: Scene, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound]
 ) -> tuple[str, ...]:
     """The persons who stand, by what the names of each begin with; see `_stands`."""
     figure = scene.figure
@@ -219,7 +219,7 @@ def standing(
     return tuple(body for body in bodies if _stands(scene, start, terms, bounds, body))
 
 
-def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
+def balancing(scene: Scene, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
     """The figures with feet, by what their names begin with, of which no term says how they stand."""
     figure = scene.figure
     stated = [inputs.body_of(scene, term.feet) for term in terms if is_a(term, UPRIGHT)]
@@ -230,9 +230,7 @@ def balancing(scene: Surroundings, terms: Sequence[Constraint | Goal]) -> tuple[
     )
 
 
-def _stands(
-    scene: Surroundings, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], body: str
-) -> bool:
+def _stands(scene: Scene, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound], body: str) -> bool:
     """Whether a person stands: both feet are held where they are at the start, and nothing else carries it."""
     figure = scene.figure
     held = [term for term in terms if is_a(term, (Hold,)) and not term.residual.base.frame]

@@ -1,4 +1,4 @@
-"""Weighted squared distance of a posture from another, and the measures that are one: efforts and `Displacement`."""
+"""Measures that are squared distances: efforts, `Displacement`, and the squared error of a goal that may give way."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.base.checks import instance
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Expansion, Measure, Surroundings, filled
+from wholebody.tasks.base import Expansion, Goal, Measure, filled
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
@@ -131,7 +133,7 @@ class Effort(DistanceMeasure):
     weight: inputs.Weight = 1.0
     distance: SquaredDistance = field(init=False, repr=False)  # the start, and the weight of every degree of freedom
 
-    def resolve(self, scene: Surroundings, start: Array) -> Effort:
+    def resolve(self, scene: Scene, start: Array) -> Effort:
         """Store the start."""
         return filled(self, distance=SquaredDistance.build(start, scene.figure.effort_weights))
 
@@ -156,7 +158,7 @@ class Displacement(DistanceMeasure):
     weight: inputs.Weight = 1.0
     distance: SquaredDistance = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Displacement:
+    def resolve(self, scene: Scene, start: Array) -> Displacement:
         """Read the neutral posture and the weights of the figure."""
         figure = scene.figure
         return filled(self, distance=SquaredDistance.build(figure.neutral, figure.neutral_weights))
@@ -218,7 +220,7 @@ class RotationEffort(SumOfSquares):
     balls: tuple[BallJoint, ...] = field(init=False, repr=False)  # the ball joints
     others: SquaredDistance = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:
+    def resolve(self, scene: Scene, start: Array) -> RotationEffort:
         """Find the ball joints, and store the start."""
         weights = np.array(scene.figure.effort_weights, dtype=float)
         balls = ball_joints(scene.model, start, weights)
@@ -279,3 +281,47 @@ def _hinges_of_one_centre(model: Any, first: int) -> list[int]:
         chain += after
         after = [k for k in range(1, model.njoints) if model.parents[k] == chain[-1]]
     return chain
+
+
+@dataclass(frozen=True, eq=False)
+class Soft(SumOfSquares):
+    """A goal as a preference: its squared error [m^2, rad^2], which is weighed against the other measures.
+
+    Goals and constraints come first: where a preference cannot be met, or costs more than it is worth, the answer is
+    solved all the same. The error that is left is ``problem.measures[k].goal.error(state)``. Of a preference
+    that stays far off "newton" converges slowly; take "qp".
+
+    Attributes:
+        goal: any goal, such as `wb.Point("left_palm", place)`. Its weight is a factor too.
+        weight: factor on the squared error. `Effort` of a person who reaches is about 1: with a weight of 100, 0.1 m
+            cost as much.
+
+    Raises:
+        InputError: no goal, or a weight out of range.
+
+    Examples:
+        >>> rather = wb.Soft(wb.Point("left_palm", (0.3, 0.3, 1.0)), weight=10.0)
+    """
+
+    goal: Goal
+    weight: inputs.Weight = 100.0
+
+    def __post_init__(self) -> None:
+        """Check the goal."""
+        super().__post_init__()
+        instance(self.goal, Goal, "Soft: goal", 'give a goal such as wb.Point("left_palm", place)')
+
+    def resolve(self, scene: Scene, start: Array) -> Soft:
+        """Resolve the goal."""
+        return filled(self, goal=self.goal.resolve(scene, start))
+
+    @property
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """Those of the goal."""
+        return self.goal.touching
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """The error (m,) and its derivative (m, nv), times the root of the goal's weight."""
+        error, part = self.goal.value_and_jacobian(state, self.goal.error)
+        root = np.sqrt(self.goal.weight)
+        return root * np.atleast_1d(error), root * state.dense_jacobian(part)

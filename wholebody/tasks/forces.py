@@ -14,9 +14,10 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, Feet, Margin, SolePolygon, standing_corners
-from wholebody.tasks.base import ComputedTogether, Surroundings, filled
+from wholebody.tasks.base import ComputedTogether, filled
 
 GRAVITY = 9.81
 """m/s^2, as in Pinocchio's models."""
@@ -76,7 +77,7 @@ class Loads(NamedTuple):
         return points, np.array(moves).reshape(-1, 3, state.model.nv)
 
 
-def resolved(forces: Sequence[Force], scene: Surroundings, where: str) -> Loads:
+def resolved(forces: Sequence[Force], scene: Scene, where: str) -> Loads:
     """Forces on a scene's figure."""
     places = tuple(inputs.find_place(scene, one.frame, where) for one in forces)
     return Loads(places, np.array([one.force for one in forces]).reshape(-1, 3))
@@ -142,7 +143,7 @@ class LoadedBalance(ComputedTogether):
     loads: Loads = field(init=False, repr=False)
     soles: SolePolygon = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> LoadedBalance:
+    def resolve(self, scene: Scene, start: Array) -> LoadedBalance:
         """Find the points on which the feet stand at the start."""
         points, joints = standing_corners(scene, start, self.feet)
         whole = Balance(self.feet, margin=self.margin or 0.0).on_points(points, scene, self.margin is None)

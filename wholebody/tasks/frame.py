@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Goal, Surroundings, Term, filled
+from wholebody.tasks.base import Constraint, Goal, Term, filled
 from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 
@@ -67,7 +68,7 @@ class Frame(PlacementGoal):
     resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3
     residual: PlacementResidual = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Frame:
+    def resolve(self, scene: Scene, start: Array) -> Frame:
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Frame")
         return filled(self, residual=PlacementResidual(place, self.resolved_target))
@@ -99,7 +100,7 @@ class Orientation(PlacementGoal):
     resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3 without translation
     residual: PlacementResidual = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Orientation:
+    def resolve(self, scene: Scene, start: Array) -> Orientation:
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Orientation")
         return filled(self, residual=PlacementResidual(place, self.resolved_target, position=False))
@@ -138,7 +139,7 @@ class Relative(PlacementGoal):
     resolved_placement: Any = field(init=False, repr=False, default=None)
     residual: PlacementResidual = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Relative:
+    def resolve(self, scene: Scene, start: Array) -> Relative:
         """Find the frames, and their relative placement at the start."""
         place = inputs.find_place(scene, self.frame, "Relative")
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
@@ -177,7 +178,7 @@ class Hold(PlacementTerm, Constraint):
     resolved_at: Any = field(init=False, repr=False, default=None)
     residual: PlacementResidual = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Hold:
+    def resolve(self, scene: Scene, start: Array) -> Hold:
         """Find the frames, and their placements at the start."""
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")

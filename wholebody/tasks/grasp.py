@@ -13,9 +13,10 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range, called
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
 from wholebody.tasks.grips import Crossing, Looking, Opposing, bar_of, rim_of, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, face, joined, segments_beyond, surface
@@ -106,7 +107,7 @@ class Grasp(ContactTerm):
         figure, slash, hand = self.hand.rpartition("/")
         return f"{figure}{slash}{hand.split('_')[0]}"
 
-    def resolve(self, scene: Surroundings, start: Array) -> Grasp:
+    def resolve(self, scene: Scene, start: Array) -> Grasp:
         """Find the hand, and the face, bar or sides that it takes."""
         where = f"Grasp({shown(self.hand)}, {shown(self.thing)})"
         place = inputs.find_place(scene, self.frame, where)
@@ -131,7 +132,7 @@ class Grasp(ContactTerm):
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 
     def _palm(
-        self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
+        self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
         outwards = self._outwards(scene, state) if self.side is None else np.asarray(self.side)
         taken = face(scene, self.thing, outwards, state, where)
@@ -139,7 +140,7 @@ class Grasp(ContactTerm):
         return [Gap(hand, thing, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
 
     def _power(
-        self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
+        self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
         rim = rim_of(thing, self._outwards(scene, state), state)
         if rim is not None and self.along is not None:
@@ -168,7 +169,7 @@ class Grasp(ContactTerm):
             parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED, lever=0.05))
         return parts
 
-    def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
+    def _fingers(self, scene: Scene, thing: Surface, state: State, where: str) -> list[Part]:
         """Of a pinch or of all fingertips: they touch, and the thumb opposes the others."""
         known = set(scene.figure.segments)
         wanted = FINGERS if self.kind == "fingertips" else FINGERS[:2]
@@ -206,7 +207,7 @@ class Grasp(ContactTerm):
             parts.append(Over(tip, lengthwise, np.array([low]), np.array([high])))
         return parts
 
-    def _outwards(self, scene: Surroundings, state: State) -> Array:
+    def _outwards(self, scene: Scene, state: State) -> Array:
         """Direction (3,) in the world to the hand's side, by the heading of its figure's root at the start."""
         left = 1.0 if self._side == "left" else -1.0
         root = inputs.root_of(scene, inputs.find_place(scene, self.frame, "Grasp"))
@@ -221,7 +222,7 @@ class Grasp(ContactTerm):
             return -ALONG * half, ALONG * half
         return float(self.along) * half, float(self.along) * half
 
-    def _outer_parts(self, scene: Surroundings) -> dict[str, Surface]:
+    def _outer_parts(self, scene: Scene) -> dict[str, Surface]:
         """Of each finger of the hand, its two outer parts; none of a hand that is one segment."""
         found = {}
         for finger in FINGERS:

@@ -202,13 +202,9 @@ class Opposing(NamedTuple):
     # away the normals say where the thing is, not how it is held
     far: float
     # of the arc that the row then measures [m]: so short that a finger rather turns than leaves to where the angle does
-    # not count, which ends a descent there. 1 for the angle itself
-    lever: float = 1.0
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """Whether the row is the angle itself."""
-        return (self.lever == 1.0,)
+    # not count, which ends a descent there
+    lever: float
+    in_radians: tuple[bool, ...] = (False,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and wrenches on every finger."""

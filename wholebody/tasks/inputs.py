@@ -18,7 +18,7 @@ from wholebody.base.fields import Range
 from wholebody.figures.description import Place as Place
 from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement, unit_vector
-from wholebody.tasks.base import Surroundings
+from wholebody.scene.scene import Scene
 
 T = TypeVar("T")
 
@@ -32,13 +32,13 @@ WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out
 WORLD = Place(0, 0, pin.SE3.Identity())  # The world: Pinocchio's frame and joint 0
 
 
-def once(scene: Surroundings, key: Hashable, make: Callable[[], T]) -> T:
+def once(scene: Scene, key: Hashable, make: Callable[[], T]) -> T:
     """What follows from figure and things, where they are, and a key alone: made once, and read-only."""
     found: T = scene.built.known((key, scene.built.moves), make)
     return found
 
 
-def find_place(scene: Surroundings, name: str, where: str) -> Place:
+def find_place(scene: Scene, name: str, where: str) -> Place:
     """Look up a frame, or the joint of that name."""
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a frame, not {shown(name)}")
@@ -48,7 +48,7 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
         raise UnknownNameError(error.kind, error.name, error.known, where) from None
 
 
-def find_feet(scene: Surroundings, feet: Sequence[str], where: str) -> list[Place]:
+def find_feet(scene: Scene, feet: Sequence[str], where: str) -> list[Place]:
     """Look up the segments that a figure stands on; those of one figure among several have its name too."""
     exists = scene.model.existFrame
     owners = [body for body in scene.figure.bodies if body and all(exists(f"{body}{foot}") for foot in feet)]
@@ -58,7 +58,7 @@ def find_feet(scene: Surroundings, feet: Sequence[str], where: str) -> list[Plac
     return [find_place(scene, foot, where) for foot in feet]
 
 
-def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:
+def find_base(scene: Scene, name: str | None, moved: str, where: str) -> Place:
     """Look up the reference frame of another frame; None is the world."""
     if name is None:
         return WORLD
@@ -68,19 +68,19 @@ def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> 
     return base
 
 
-def body_of(scene: Surroundings, frames: Sequence[str]) -> str | None:
+def body_of(scene: Scene, frames: Sequence[str]) -> str | None:
     """What the names of the figure begin with that all these frames belong to; None if they are of several."""
     found = {body for body in scene.figure.bodies for frame in frames if str(frame).startswith(body)}
     return found.pop() if len(found) == 1 else None
 
 
-def root_of(scene: Surroundings, place: Place) -> int:
+def root_of(scene: Scene, place: Place) -> int:
     """Index of the joint of the free root that carries a frame; 0, the world, for one of a fixed figure."""
     roots = set(scene.figure.roots.values())
     return next((int(joint) for joint in scene.model.supports[place.joint] if joint in roots), 0)
 
 
-def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Indices:
+def find_dofs(scene: Scene, names: Sequence[str], where: str) -> Indices:
     """Tangent indices (k,) of joints and groups."""
     try:
         return np.asarray(scene.figure.dofs(names), dtype=np.intp)
@@ -90,7 +90,7 @@ def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Indices:
         raise InputError(f"{where}: {error}") from None
 
 
-def angular_dofs(scene: Surroundings) -> Mask:
+def angular_dofs(scene: Scene) -> Mask:
     """(nv,) whether each degree of freedom is in radians, which holds for rotations."""
 
     def found() -> Mask:
@@ -159,7 +159,7 @@ Target: TypeAlias = Annotated[PlacementLike, target_placement]
 Name: TypeAlias = Annotated[str, name]
 
 
-def joints_with_mass(scene: Surroundings, where: str, frames: Sequence[str] = ()) -> range | None:
+def joints_with_mass(scene: Scene, where: str, frames: Sequence[str] = ()) -> range | None:
     """The joints whose mass counts: None for all, or those of the one figure that has these frames."""
     figure, joints = scene.figure, None
     if frames and len(figure.bodies) > 1:

@@ -10,8 +10,9 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known, settle
 from wholebody.figures.state import State, Wrench
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Goal, Surroundings, filled
+from wholebody.tasks.base import Constraint, Goal, filled
 from wholebody.tasks.residuals import point_rows
 
 
@@ -44,7 +45,7 @@ class Point(Goal):
     resolved_target: Array = field(init=False, repr=False)  # (3,) `target` as an array [m]
     resolved_offset: Array = field(init=False, repr=False)  # (3,) `offset` as an array [m]
 
-    def resolve(self, scene: Surroundings, start: Array) -> Point:
+    def resolve(self, scene: Scene, start: Array) -> Point:
         """Find the frame."""
         return filled(self, place=inputs.find_place(scene, self.frame, "Point"))
 
@@ -91,7 +92,7 @@ class CenterOfMass(Goal):
         super().__post_init__()
         settle(self, "resolved_target", self.resolved_target[: len(self.axes)])
 
-    def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
+    def resolve(self, scene: Scene, start: Array) -> CenterOfMass:
         """Find the figure; InputError if no moving part of it has mass."""
         frames: tuple[str, ...] = ()
         if self.figure is not None:
@@ -140,7 +141,7 @@ class Plane(Constraint):
     place: inputs.Place = field(init=False, repr=False)  # the frame and the joint that carries it
     height: float = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Plane:
+    def resolve(self, scene: Scene, start: Array) -> Plane:
         """Find the frame, and the plane through its position at the start."""
         place = inputs.find_place(scene, self.frame, "Plane")
         point = self.resolved_point

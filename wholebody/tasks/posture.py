@@ -14,8 +14,9 @@ from wholebody.base.checks import array, listed, numbers
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import ROUNDING
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.base import Goal, filled
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Posture(Goal):
         if self.joints is not None and not isinstance(self.joints, str):
             object.__setattr__(self, "joints", tuple(listed(self.joints, "Posture: joints", "['left_arm']")))
 
-    def resolve(self, scene: Surroundings, start: Array) -> Posture:
+    def resolve(self, scene: Scene, start: Array) -> Posture:
         """Look up the posture and the joints."""
         model = scene.model
         dofs = np.arange(model.nv) if self.joints is None else inputs.find_dofs(scene, self.joints, "Posture")
@@ -73,7 +74,7 @@ class Posture(Goal):
         """(m, nv)."""
         return np.asarray(pin.dDifference(state.model, self.resolved_target, state.q, pin.ARG1)[self.dofs])
 
-    def _find(self, scene: Surroundings) -> Array:
+    def _find(self, scene: Scene) -> Array:
         if isinstance(self.target, str):
             try:
                 return np.asarray(scene.figure.posture(self.target), dtype=float)

@@ -16,8 +16,9 @@ from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange, TwistRange
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.base import Constraint, filled
 
 
 class Limb(NamedTuple):
@@ -54,7 +55,7 @@ class ReachCones(Constraint):
     _joints: NDArray[np.intp] = field(init=False, repr=False)
     _against: NDArray[np.intp] = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> ReachCones:
+    def resolve(self, scene: Scene, start: Array) -> ReachCones:
         """Find the cones and their frames."""
         cones = scene.figure.cones
         if not cones:
@@ -223,7 +224,7 @@ class RangeOfMotion(Constraint):
     rows: tuple[Row, ...] = field(init=False, repr=False)  # each range with its frames and joints
     row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
 
-    def resolve(self, scene: Surroundings, start: Array) -> RangeOfMotion:
+    def resolve(self, scene: Scene, start: Array) -> RangeOfMotion:
         """Find the ranges, their frames and joints."""
         ranges = scene.figure.ranges
         if not ranges:
@@ -250,7 +251,7 @@ def _between(coordinates: tuple[Coordinate, ...], least: Array, most: Array) -> 
     return low, sum(max(factor * float(least[q]), factor * float(most[q])) for q, _, factor in coordinates)
 
 
-def _row(part: MotionRange, scene: Surroundings) -> Row:
+def _row(part: MotionRange, scene: Scene) -> Row:
     if isinstance(part, CoupledRange):
         return CoupledRow(tuple(_coordinate(scene, joint, factor) for joint, factor in part.joints.items()), part.bound)
     if isinstance(part, EllipticRange):
@@ -261,7 +262,7 @@ def _row(part: MotionRange, scene: Surroundings) -> Row:
     return TwistRow(places[0], places[1], part)
 
 
-def _coordinate(scene: Surroundings, name: str, factor: float) -> Coordinate:
+def _coordinate(scene: Scene, name: str, factor: float) -> Coordinate:
     joint: Any = scene.model.joints[scene.figure.joint_id(name)]
     if joint.nq != 1:
         raise InputError(f"RangeOfMotion: joint {name!r} has no single angle; name joints of one degree of freedom")

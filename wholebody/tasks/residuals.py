@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
-from wholebody.tasks.base import Surroundings
+from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import WORLD, Place
 
 _FORCES: Array = np.eye(3, 6)
@@ -105,7 +105,7 @@ class PlacementResidual(NamedTuple):
         return np.concatenate(blocks)
 
 
-def placement_between(scene: Surroundings, q: Array, frame: str, base: str | None) -> Any:
+def placement_between(scene: Scene, q: Array, frame: str, base: str | None) -> Any:
     """Placement (pin.SE3) of one frame in another, or in the world, at the posture q (nq,)."""
     place = scene.figure.placement(q, frame)
     return place if base is None else scene.figure.placement(q, base).actInv(place)

@@ -14,8 +14,9 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.distance import SumOfSquares
 
 LUMBAR_MOST, LUMBAR_RATE = math.radians(46.0), 2.5
@@ -122,7 +123,7 @@ class Rhythm(SumOfSquares):
     knees: tuple[Elevation, ...] = field(init=False, repr=False)
     lumbar: tuple[Lumbar, ...] = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
+    def resolve(self, scene: Scene, start: Array) -> Rhythm:
         """Find the joints, and what the lumbar spine has at the start."""
         girdles, knees, spines = inputs.once(scene, (Rhythm, self.style), partial(_parts, scene.figure, self.style))
         if not girdles and not spines:

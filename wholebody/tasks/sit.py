@@ -13,9 +13,10 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Made, Near, Over, Part, owner_pairs
 from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, segments_on, surface
 
@@ -64,14 +65,14 @@ class Sit(ContactTerm):
         """What sits."""
         return self.pelvis
 
-    def resolve(self, scene: Surroundings, start: Array) -> Sit:
+    def resolve(self, scene: Scene, start: Array) -> Sit:
         """Find the surfaces and the seat's face."""
         where, things = f"Sit({shown(self.on)})", [self.on, *filter(None, [self.back])]
         key = type(self), self.on, self.back, self.pelvis, self.trunk, self.erect
         parts, touches = once_by(scene, things, where, start, key, partial(self._between, scene, where))
         return filled(self, parts=parts, touches=touches)
 
-    def _between(self, scene: Surroundings, where: str, state: State, rest: State) -> Made:
+    def _between(self, scene: Scene, where: str, state: State, rest: State) -> Made:
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
         seat = face(scene, self.on, UP, state, where)
         thighs = inputs.once(scene, ("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
@@ -107,7 +108,7 @@ class Sit(ContactTerm):
             parts += [Level(place, ahead, seat), self._measured(scene, place, where)]
         return tuple(parts), touches
 
-    def _measured(self, scene: Surroundings, place: inputs.Place, where: str) -> AtAngles:
+    def _measured(self, scene: Scene, place: inputs.Place, where: str) -> AtAngles:
         """Hips, spine and neck as in the posture of people who are measured: sitting, with parallel thighs."""
         figure, body = scene.figure, self.pelvis.removesuffix("pelvis")
         names = [f"{body}spine", f"{body}neck", *(f"{body}{side}_leg" for side in ("left", "right"))]
@@ -142,7 +143,7 @@ class AtAngles(NamedTuple):
         return state.q[self.idx_q] - self.angles, moves
 
 
-def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
+def _thighs(scene: Scene, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
     """The first segments with pieces of each limb at the pelvis, without the trunk."""
     model, found = scene.model, []
     segments = set(scene.figure.segments)
@@ -162,7 +163,7 @@ def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> l
     return found
 
 
-def _depth(scene: Surroundings, name: str, place: inputs.Place, state: State) -> float:
+def _depth(scene: Scene, name: str, place: inputs.Place, state: State) -> float:
     """How far the pelvis reaches below its origin in the upright state, metres."""
     shape = joined(scene, name, [name])
     lows = [outermost(piece, shape.placed(k, state), -UP)[:, 2].min() for k, piece in enumerate(shape.shapes)]

@@ -1,4 +1,4 @@
-"""Contact: a figure that stands with flat soles on something, and does not fall."""
+"""Contact: a figure that stands with flat soles on something; measures of how feet stand and free arms hang."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ from functools import partial
 from typing import Annotated
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import shown, some
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
-from wholebody.figures.state import State
+from wholebody.figures.state import State, Wrench
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.axis import across
+from wholebody.tasks.axis import across, equidistant_error, equidistant_jacobian
 from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, SolePolygon, polygon
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Facing, Gap, Made, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP
@@ -61,7 +63,7 @@ class Stand(TermOfParts):
     knees: Annotated[Sequence[str], Names("['right_shank']", least=0)] = ()
     keeps: float = field(init=False, repr=False, default=0.0)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Stand:
+    def resolve(self, scene: Scene, start: Array) -> Stand:
         """Find the soles and the face that they stand on."""
         where = f"Stand({shown(self.on)})"
         if stray := [str(knee) for knee in self.knees if knee not in self.feet]:
@@ -79,7 +81,7 @@ class Stand(TermOfParts):
             keeps = STEADY * polygon(corners).width if self.margin is None else self.margin
         return filled(self, parts=parts, touches=touches, keeps=keeps)
 
-    def _between(self, scene: Surroundings, where: str, state: State, rest: State) -> Made:
+    def _between(self, scene: Scene, where: str, state: State, rest: State) -> Made:
         ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
         parts: list[Part] = []
         touches: tuple[tuple[str, str], ...] = ()
@@ -161,7 +163,7 @@ class Stance(SumOfSquares):
     places: tuple[inputs.Place, inputs.Place] = field(init=False, repr=False)
     rest: Array = field(init=False, repr=False)
 
-    def resolve(self, scene: Surroundings, start: Array) -> Stance:
+    def resolve(self, scene: Scene, start: Array) -> Stance:
         """Find the feet, and how they are in the first posture."""
         if len(self.feet) != 2:
             raise InputError(f"Stance: feet has {len(self.feet)} names; give two")
@@ -196,3 +198,56 @@ def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[lis
         if point @ under >= deepest - within
     ]
     return [point for point, _ in pairs], [joint for _, joint in pairs]
+
+
+HANGS = 6.0
+"""1/rad^2, beside an effort of 0.7 that counts from the trunk: ESTIMATE."""
+
+
+BELOW = np.array((1.0, 1.0, -1.0))  # x, y and down by x, y and z
+
+
+@dataclass(frozen=True, eq=False)
+class Hang(SumOfSquares):
+    """Squared angles of upper arms from where they hang when the figure is upright [rad^2].
+
+    A person who stands or kneels has this measure by default for each arm that no term moves. By `Effort` alone, which
+    counts from the trunk, it would point back where the trunk bends.
+
+    Attributes:
+        arms: the segments that hang.
+        weight: factor on the measure.
+        places: of these, once resolved.
+        down: (k, 3) directions in their joints that hang.
+
+    Raises:
+        InputError: no name, or a weight out of range.
+        UnknownNameError: in a problem, an arm that the figure does not have.
+
+    Examples:
+        >>> at_ease = wb.tasks.Hang(["left_upper_arm"])
+    """
+
+    arms: Annotated[Sequence[str], Names("['left_upper_arm']")] = ("left_upper_arm", "right_upper_arm")
+    weight: inputs.Weight = HANGS
+    places: tuple[inputs.Place, ...] = field(init=False, repr=False)
+    down: Array = field(init=False, repr=False)
+
+    def resolve(self, scene: Scene, start: Array) -> Hang:
+        """Find the upper arms, and how they hang in the first posture."""
+        places, figure = tuple(inputs.find_place(scene, arm, "Hang") for arm in self.arms), scene.figure
+        with figure.posed(figure.neutral) as upright:
+            down = np.array([-upright.data.oMi[place.joint].rotation[2] for place in places])
+        return filled(self, places=places, down=down)
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """The angle of each along the world's x and y axes (2 k,), and the derivatives (2 k, nv)."""
+        found, moves = [], []
+        for place, down in zip(self.places, self.down, strict=True):
+            way = state.data.oMi[place.joint].rotation @ down
+            x, y, z = way.tolist()
+            wrench = np.zeros((2, 6))
+            wrench[:, 3:] = -(equidistant_jacobian(x, y, -z) * BELOW) @ pin.skew(way)
+            found.append(equidistant_error(x, y, -z))
+            moves.append(state.wrench_jacobian(Wrench(wrench, place.joint)))
+        return np.concatenate(found), np.vstack(moves)

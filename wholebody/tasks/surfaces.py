@@ -19,8 +19,8 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
 from wholebody.geometry.pieces import SweptPoints, swept_points
+from wholebody.scene.scene import Scene
 from wholebody.tasks.axis import across
-from wholebody.tasks.base import Surroundings
 from wholebody.tasks.inputs import once
 
 _T = TypeVar("_T")
@@ -68,7 +68,7 @@ class Nearest(NamedTuple):
     pieces: tuple[int, int]  # number of the piece of the first surface, and of the second
 
 
-def surface(scene: Surroundings, name: str, where: str) -> Surface:
+def surface(scene: Scene, name: str, where: str) -> Surface:
     """The surface of a thing, a segment or a piece; of a frame, the point at its origin."""
     # A link of a file without pieces is the hull of what is drawn of it, or of all that moves with it.
     if not isinstance(name, str):
@@ -96,12 +96,12 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
     return Surface(name, (), None, (), (joint,), (), (), (), frame.placement).with_shapes((coal.Sphere(POINT),))
 
 
-def joined(scene: Surroundings, name: str, owners: Collection[str]) -> Surface:
+def joined(scene: Scene, name: str, owners: Collection[str]) -> Surface:
     """The surface of several segments or things that count as one."""
     return _of_pieces(scene, name, [index for index, owner in enumerate(scene.piece_owner) if owner in owners])
 
 
-def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
+def carried_by(scene: Scene, name: str, joint: int) -> Surface:
     """The surface of the figure's own pieces that a joint carries."""
     segments = set(scene.figure.segments)
     pieces = scene.geometry.geometryObjects
@@ -110,7 +110,7 @@ def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
 
 
 def once_by(
-    scene: Surroundings, things: Iterable[str], where: str, start: Array, key: Hashable,
+    scene: Scene, things: Iterable[str], where: str, start: Array, key: Hashable,
     make: Callable[[State, State], _T],
 ) -> _T:  # fmt: skip
     """What `make` makes of the start (nq,) and the neutral posture; once, where the figure carries none of some things.
@@ -135,7 +135,7 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
     return _made(name, (), made, range(made.ngeoms))
 
 
-def _of_pieces(scene: Surroundings, name: str, indices: Sequence[int]) -> Surface:
+def _of_pieces(scene: Scene, name: str, indices: Sequence[int]) -> Surface:
     owners = tuple(dict.fromkeys(scene.piece_owner[k] for k in indices))
     return once(scene, ("surface", name, *indices), lambda: _made(name, owners, scene.geometry, indices))
 
@@ -212,7 +212,7 @@ class Face(NamedTuple):
         return place.act(self.center), self.axes @ place.rotation.T
 
 
-def face(scene: Surroundings, name: str, direction: Array, state: State, where: str) -> Face:
+def face(scene: Scene, name: str, direction: Array, state: State, where: str) -> Face:
     """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest."""
     found = surface(scene, name, where)
     if found.fixed is not None:
@@ -252,14 +252,14 @@ def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoin
     return np.asarray(swept.points @ placement.rotation.T + placement.translation + swept.radius * direction)
 
 
-def segments_on(scene: Surroundings, joints: Iterable[int]) -> list[str]:
+def segments_on(scene: Scene, joints: Iterable[int]) -> list[str]:
     """Segments with pieces on some joints."""
     segments, wanted = set(scene.figure.segments), set(joints)
     owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
     return list(dict.fromkeys(one for one, piece in owners if piece.parentJoint in wanted and one in segments))
 
 
-def segments_beyond(scene: Surroundings, joint: int) -> list[str]:
+def segments_beyond(scene: Scene, joint: int) -> list[str]:
     """Segments on a joint and beyond it, such as a foot with its toes, or a hand with its fingers."""
     joints = (k for k in range(scene.model.njoints) if joint in scene.model.supports[k])
     return once(scene, ("beyond", joint), lambda: segments_on(scene, joints))

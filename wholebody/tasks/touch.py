@@ -12,9 +12,10 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Made, Meeting, OwnSurface, Part, owner_pairs
 from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
 
@@ -61,13 +62,13 @@ class Touch(ContactTerm):
         """(3,) the middle of the two nearest points, once resolved [m]: where they touch."""
         return nearest(self.parts[0].first, self.parts[0].second, state).point  # type: ignore[attr-defined]
 
-    def resolve(self, scene: Surroundings, start: Array) -> Touch:
+    def resolve(self, scene: Scene, start: Array) -> Touch:
         """Find the two surfaces."""
         key = type(self), self.part, self.thing
         parts, touches = inputs.once(scene, key, partial(self._between, scene))
         return filled(self, parts=parts, touches=touches)
 
-    def _between(self, scene: Surroundings) -> Made:
+    def _between(self, scene: Scene) -> Made:
         where = f"Touch({shown(self.part)}, {shown(self.thing)})"
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
@@ -109,7 +110,7 @@ class Lean(ContactTerm):
         """What leans."""
         return self.part
 
-    def resolve(self, scene: Surroundings, start: Array) -> Lean:
+    def resolve(self, scene: Scene, start: Array) -> Lean:
         """Find the surfaces, and the face of the thing that looks at the part."""
         where = f"Lean({shown(self.on)})"
         place = inputs.find_place(scene, self.part, where)
@@ -123,7 +124,7 @@ class Lean(ContactTerm):
         return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))
 
 
-def _meeting(scene: Surroundings, first: Surface, second: Surface, where: str) -> tuple[Part, ...]:
+def _meeting(scene: Scene, first: Surface, second: Surface, where: str) -> tuple[Part, ...]:
     """Two points that meet; where both are on the surfaces of their pieces, those look at each other."""
     meeting, normals = Meeting(first, second), (_outwards(scene, first), _outwards(scene, second))
     if normals[0] is None or normals[1] is None:
@@ -133,7 +134,7 @@ def _meeting(scene: Surroundings, first: Surface, second: Surface, where: str) -
     return meeting, Facing(place, across(normals[0]), face, np.array((0.0, 0.0, -1.0)))
 
 
-def _outwards(scene: Surroundings, point: Surface) -> Array | None:
+def _outwards(scene: Scene, point: Surface) -> Array | None:
     """Normal (3,) of the piece on whose surface a point is, in the axes of its frame; None where it is on none."""
     own = own_surface(scene, point)
     if own is None:
@@ -142,7 +143,7 @@ def _outwards(scene: Surroundings, point: Surface) -> Array | None:
     return np.asarray(point.fixed.rotation.T @ way / np.linalg.norm(way))
 
 
-def own_surface(scene: Surroundings, point: Surface) -> OwnSurface | None:
+def own_surface(scene: Scene, point: Surface) -> OwnSurface | None:
     """The piece on whose round surface, or within whose face, a point is; None for other surfaces and places."""
     if point.fixed is None:
         return None
@@ -171,7 +172,7 @@ def own_surface(scene: Surroundings, point: Surface) -> OwnSurface | None:
     return None
 
 
-def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:
+def touched(scene: Scene, found: Surface) -> tuple[str, ...]:
     """Segments and things whose clearance is zero where a surface touches: without owners, what its joint carries."""
     return found.owners or carried_by(scene, found.name, found.joints[0]).owners
 

@@ -12,7 +12,7 @@ import pytest
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.attack.judging import Case, Verdict
-from wholebody.cli.bench import run as group
+from wholebody.cli.bench import group
 
 
 def bench(*words: str) -> int:

@@ -20,8 +20,9 @@ from wholebody.bench.attack.judging import Verdict, chosen
 from wholebody.bench.suite.problem_sets.things import turned
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
 from wholebody.solution import Solution
-from wholebody.tasks.base import Surroundings, Term, filled
+from wholebody.tasks.base import Term, filled
 
 Contact = tuple[dict[str, tuple[wb.Shape, Any]], Any, list[str]]
 """Things with their places, a term, and the frames that make it."""
@@ -151,7 +152,7 @@ class _Own(Term):
     def __init__(self, asked: Asked) -> None:
         self.asked = asked
 
-    def resolve(self, scene: Surroundings, start: Array) -> Any:
+    def resolve(self, scene: Scene, start: Array) -> Any:
         index = scene.figure.frame_id(self.asked.frame)
         place = scene.figure.placement(start, self.asked.frame).translation.copy()
         return filled(self, index=index, joint=scene.model.frames[index].parentJoint, place=place)

@@ -45,6 +45,12 @@ def seed(of: str) -> Option:
     return count("--seed", 0, of, least=0)
 
 
+CLIPS = (
+    option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),
+    listed("--only", "names of clips (default: all)", "CLIP"),
+)
+
+
 class Chart(NamedTuple):
     """A chart that is still to be drawn: `draw` draws it into a file of another suffix, and returns SVG and PNG."""
 

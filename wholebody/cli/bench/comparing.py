@@ -3,59 +3,31 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rich.console import Console
 
 from wholebody.base.errors import InputError
+from wholebody.bench.rows import chart
+from wholebody.bench.suite.adapters.registry import adapters, missing
+from wholebody.bench.suite.compare import own_task
+from wholebody.bench.suite.compare import run as comparison
+from wholebody.bench.suite.compare.lock import differences, in_words, locked, read_lock, shares
+from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
+from wholebody.bench.suite.compare.run import QUICK, Settings
+from wholebody.bench.suite.compare.summary import advice
+from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.arguments import JOBS
-from wholebody.cli.bench.command import folders, listed, quick, seed
-from wholebody.cli.command import command, count, flag, option
-
-if TYPE_CHECKING:
-    from wholebody.bench.suite.compare.run import Settings
+from wholebody.cli.tables import bar, print_rows
+from wholebody.taskfile import read_task
 
 
-@command(
-    "compare",
-    "every method on every problem set",
-    """\
-Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
-(report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. Call an
-interrupted run again with the same settings and folder to continue it; a finished one writes its report again.
---held-out adds uniform witnesses, other people, other clutter and other robots beside the sets of the same questions.
---again compares times in units of a reference kernel; the exit code is 1 if the solved problems differ. --jobs solves
-cases in parallel by joblib, --cluster on a dask cluster.""",
-    quick("20 problems a set, within three minutes on two cores"),
-    option(
-        "--task", type=Path, metavar="TASK.toml", help="compare on the problem of a task file, in place of the sets"
-    ),
-    listed("--sets", "problem sets (default: all)"),
-    listed(
-        "--methods",
-        "methods, such as qp, newton or qp/daqp; all for every method (default: one of each algorithm, from one "
-        "start and from several; with --quick with their usual starts)",
-    ),
-    count("--cases", None, "problems of each set (default: 200)"),
-    option("--minutes", type=float, metavar="N", help="of solving in all (default: 25; with --quick 2)"),
-    seed("of all problems"),
-    *JOBS,
-    flag("--held-out", "pose problems of distributions that no constant was tuned on"),
-    option("--again", type=Path, metavar="LOCK.json", help="repeat the comparison that left this file"),
-    *folders("out/compare"),
-)
 def compare(arguments: argparse.Namespace) -> int:
     """Compare methods; 1 where a comparison that is repeated solves other problems."""
     if arguments.task is not None:
         return _compare_on_task(arguments)
     if arguments.again is not None:
         return _again(arguments)
-    from wholebody.bench.suite.adapters.registry import missing
-    from wholebody.bench.suite.compare import run as comparison
-    from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
-    from wholebody.bench.suite.compare.summary import advice
-    from wholebody.cli.tables import bar
-
     jobs = arguments.at_once
     settings = _settings(arguments)
     with bar("starting") as tell:
@@ -81,10 +53,6 @@ def _facts(beside: str) -> dict[str, str]:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    from wholebody.bench.suite.adapters.registry import adapters
-    from wholebody.bench.suite.compare.run import QUICK, Settings
-    from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
-
     if arguments.held_out:
         _alone(arguments, "held_out", ("sets",))
     named = arguments.sets or (beside(print) if arguments.held_out else SETS)
@@ -111,14 +79,6 @@ OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs"
 
 
 def _compare_on_task(arguments: argparse.Namespace) -> int:
-    from rich.console import Console
-
-    from wholebody.bench.rows import chart
-    from wholebody.bench.suite.adapters.registry import adapters
-    from wholebody.bench.suite.compare import own_task
-    from wholebody.cli.tables import print_rows
-    from wholebody.taskfile import read_task
-
     _alone(arguments, "task", OF_SETS)
     title = read_task(arguments.task).title
     chosen = adapters(arguments.methods, starts=True)
@@ -136,11 +96,6 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
 
 def _again(arguments: argparse.Namespace) -> int:
     _alone(arguments, "again", OF_A_LOCK)
-    from wholebody.bench.suite.adapters.registry import missing
-    from wholebody.bench.suite.compare import run as comparison
-    from wholebody.bench.suite.compare.lock import differences, in_words, locked, read_lock, shares
-    from wholebody.bench.suite.compare.report import PAGE, publish
-
     published = read_lock(arguments.again)
     settings = published.settings()
     jobs = arguments.at_once

@@ -5,82 +5,36 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import JOBS
+from rich.markup import escape
+
+from wholebody.base.errors import InputError
+from wholebody.base.files import check_writable, checked_target, write
 from wholebody.cli.clip.arguments import (
-    EQUIPMENT,
-    MOTIONS,
-    PAGE,
-    SCENE,
     figure_of,
     scene_of,
     skeleton_of,
 )
-from wholebody.cli.command import command, flag, option
-
-if TYPE_CHECKING:
-    from wholebody.motion.avoider import Avoider
-    from wholebody.motion.batch_table import AvoidedCase
-    from wholebody.motion.judging import Avoided
+from wholebody.cli.tables import bar, console, table
+from wholebody.motion.avoidance import as_avoider, avoid
+from wholebody.motion.avoider import Avoider, has_setting
+from wholebody.motion.batch import BatchProgress, avoid_many
+from wholebody.motion.batch_table import AvoidedCase
+from wholebody.motion.files import check_ending
+from wholebody.motion.judging import Avoided
+from wholebody.motion.reading import read_clip
+from wholebody.motion.strength import Strength
+from wholebody.motion.worn_equipment import put_on
+from wholebody.view.motion_curves import motion_curves
 
 METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
 
 
-@command(
-    "avoid",
-    "free motions of collisions",
-    """\
-Free motions of collisions of the body with itself, with its equipment and with things. All pairs in all frames and
-sweeps between them judge the answer, independently of the method; the exit code is 1 if a collision remains.
-
-Several motions, pieces of equipment or methods are a batch: each motion with each equipment by each method, written
-into a folder with a table (cases.csv, cases.jsonl). Cases that the folder holds are not done again, so an interrupted
-batch continues.""",
-    *MOTIONS,
-    option(
-        "--method",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="how (default: trajectory); repeated, each in turn",
-    ),
-    EQUIPMENT,
-    SCENE,
-    flag("--dynamics", "keep torques within the strength of a median person, and the balance within the feet"),
-    option(
-        "--stretch",
-        type=float,
-        metavar="FACTOR",
-        help="slow the motion by up to this factor where joints are too fast or, with --dynamics, too weak",
-    ),
-    option(
-        "--out",
-        type=Path,
-        metavar="OUT",
-        help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
-    ),
-    PAGE,
-    *JOBS,
-    epilog="""\
-examples:
-  wholebody clip avoid walk.bvh --equipment pack
-  wholebody clip avoid walk.bvh --equipment pack --html walk.html
-  wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """Free the clips, write them, and say what was found."""
     methods, worn = arguments.method or [METHOD], arguments.equipment or [WORN]
     if len(arguments.files) * len(methods) * len(worn) > 1:
         return _batch(arguments, methods, worn)
-    from wholebody.base.errors import InputError
-    from wholebody.base.files import check_writable, checked_target, write
-    from wholebody.cli.tables import bar
-    from wholebody.motion.avoidance import avoid
-    from wholebody.motion.files import check_ending
-    from wholebody.motion.reading import read_clip
-    from wholebody.motion.worn_equipment import put_on
-
     (file,) = arguments.files
     out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")), [file])
     if arguments.html is not None:
@@ -94,8 +48,6 @@ def run(arguments: argparse.Namespace) -> int:
         avoided = avoid(clip, scene, method=method, progress=lambda report: bool(tell(report.share, report.note)))
     _tell(avoided, avoided.clip.write(out))
     if arguments.html is not None:
-        from wholebody.view.motion_curves import motion_curves
-
         motion = skeleton_of(file, len(clip))
         before = "before" if motion is None else "retargeted"
         page = motion_curves(motion, {before: clip, "freed": avoided.clip}, scene)
@@ -105,11 +57,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for."""
-    from wholebody.base.errors import InputError
-    from wholebody.motion.avoidance import as_avoider
-    from wholebody.motion.avoider import has_setting
-    from wholebody.motion.strength import Strength
-
     method, settings = as_avoider(name), {}
     if arguments.stretch is not None:
         if not has_setting(method, "stretch"):
@@ -123,10 +70,6 @@ def _method(name: str, arguments: argparse.Namespace) -> Avoider:
 
 
 def _tell(avoided: Avoided, written: Path) -> None:
-    from rich.markup import escape
-
-    from wholebody.cli.tables import console, table
-
     shown = console()
     report, clip = avoided.report, avoided.clip
     color = "green" if report.solved else "red"
@@ -153,10 +96,6 @@ def _tell(avoided: Avoided, written: Path) -> None:
 
 
 def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
-    from wholebody.base.errors import InputError
-    from wholebody.cli.tables import bar
-    from wholebody.motion.batch import BatchProgress, avoid_many
-
     if arguments.html is not None:
         raise InputError("--html is for one motion with one equipment by one method; give one of each")
     if arguments.scene is not None:
@@ -184,10 +123,6 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
 
 
 def _table(rows: tuple[AvoidedCase, ...]) -> None:
-    from rich.markup import escape
-
-    from wholebody.cli.tables import console, table
-
     made = table(
         "motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a second"
     )

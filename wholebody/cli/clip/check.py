@@ -3,56 +3,32 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from wholebody.cli.arguments import JOBS
-from wholebody.cli.clip.arguments import EQUIPMENT, MOTIONS, SCENE, scene_of
-from wholebody.cli.command import command, flag, option
+from rich.console import Console
+from rich.markup import escape
 
-if TYPE_CHECKING:
-    from wholebody.motion.checking import ClipCheck
+from wholebody.base.batches import run_batch
+from wholebody.base.checks import number
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import checked_target, write
+from wholebody.base.runner import Job
+from wholebody.cli.clip.arguments import scene_of
+from wholebody.cli.tables import bar, console, table
+from wholebody.motion.checking import DEPTH, LARGEST, SMALLEST, ClipCheck, check
+from wholebody.motion.reading import read_clip
+from wholebody.motion.worn_equipment import NOTHING, put_on
+from wholebody.view.motion_curves import timeline
 
 MOST = 20  # lines of a table
 WIDE = 110  # letters that its lines need
 
 
-@command(
-    "check",
-    "what overlaps in motions, when and how deep",
-    """\
-Check a motion: every pair of pieces that can touch, in every frame and in the motion from each frame to the next one;
-joint limits, joint speeds, feet that slide while they stand, jerk. Overlaps of the figure with itself, with what it
-carries and with the things around it are told apart. Several motions, or pieces of equipment, give a line each.""",
-    *MOTIONS,
-    EQUIPMENT,
-    *JOBS,
-    SCENE,
-    option("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)"),
-    flag("--json", "print everything as JSON instead of tables"),
-    option("--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"),
-    epilog="""\
-examples:
-  wholebody clip check walk.bvh
-  wholebody clip check walk.bvh --equipment pack --html walk.html
-  wholebody clip check walk.npz --scene room.toml
-  wholebody clip check walk.npz --json > walk.json
-  wholebody clip check *.bvh --equipment pack --equipment vest_plate --jobs 4
-exit code: 1 if something overlaps by more than the depth, or a joint is beyond its limit""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """Check the clip; 1 if it overlaps or is beyond joint limits."""
-    import json
-
-    from rich.console import Console
-
-    from wholebody.base.files import checked_target, write
-    from wholebody.cli.tables import bar
-    from wholebody.motion.checking import DEPTH, check
-    from wholebody.motion.reading import read_clip
-    from wholebody.motion.worn_equipment import NOTHING, put_on
-
     depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
     if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
         return _many(arguments, depth)
@@ -68,8 +44,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         show(found)
     if arguments.html is not None:
-        from wholebody.view.motion_curves import timeline
-
         with Console(stderr=True).status("drawing"):
             page = timeline(found, scene)
         print(f"wrote {write(arguments.html, page)}", file=sys.stderr if arguments.json else sys.stdout)
@@ -78,18 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _many(arguments: argparse.Namespace, depth: float) -> int:
     """Each motion with each equipment: one line of a table each; 1 if one overlaps, or cannot be read."""
-    import json
-
-    from rich.markup import escape
-
-    from wholebody.base.batches import run_batch
-    from wholebody.base.checks import number
-    from wholebody.base.errors import InputError
-    from wholebody.base.runner import Job
-    from wholebody.cli.tables import bar, console, table
-    from wholebody.motion.checking import LARGEST, SMALLEST
-    from wholebody.motion.worn_equipment import NOTHING, put_on
-
     if arguments.html is not None:
         raise InputError("--html is for one motion with one equipment; give one file")
     number(1e3 * depth, "--depth", 1e3 * SMALLEST, 1e3 * LARGEST, "mm")
@@ -127,11 +89,6 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
 
 def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: float) -> dict[str, Any]:
     """Check a motion in a process of its own; what `ClipCheck.as_dict` gives, or why it was refused."""
-    from wholebody.base.errors import WholebodyError
-    from wholebody.motion.checking import check
-    from wholebody.motion.reading import read_clip
-    from wholebody.motion.worn_equipment import put_on
-
     try:
         scene = put_on(scene_of(arguments), worn)
         return check(read_clip(file, scene.figure), scene, depth=depth).as_dict()
@@ -141,10 +98,6 @@ def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: floa
 
 def show(found: ClipCheck) -> None:
     """Print the tables."""
-    from rich.markup import escape
-
-    from wholebody.cli.tables import console, table
-
     shown, clip = console(WIDE), found.clip
     told = f"[bold]{escape(clip.name)}[/]: {len(clip)} frames, {clip.duration:.3f} s, {escape(clip.figure.name)}"
     shown.print(told, highlight=False)

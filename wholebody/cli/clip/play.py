@@ -3,69 +3,31 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import ONE_MOTION, scene_of, skeleton_of
-from wholebody.cli.command import command, option
+import numpy as np
 
-if TYPE_CHECKING:
-    from wholebody.motion.clip import Clip
-    from wholebody.scene.scene import Scene
-    from wholebody.view.viewer import Viewer
+from wholebody.base.checks import whole
+from wholebody.base.errors import InputError
+from wholebody.base.files import checked_target
+from wholebody.cli.clip.arguments import scene_of, skeleton_of
+from wholebody.cli.tables import bar
+from wholebody.figures.postures import lowest
+from wholebody.geometry.shapes import HalfSpace
+from wholebody.motion.clip import Clip
+from wholebody.motion.reading import read_clip
+from wholebody.motion.worn_equipment import put_on
+from wholebody.scene.scene import Scene
+from wholebody.view import Viewer
+from wholebody.view.screenshot import check_movie
+from wholebody.view.side_by_side import beside, write_filmstrip
 
-NOTHING = "nothing"
 ENDINGS = (".glb", ".htm", ".html", ".mp4", ".gif", ".png")
 
 
-@command(
-    "play",
-    "show a motion",
-    """\
-Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
-without a network (.html), as glTF (.glb), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its
-ghost. With --equipment the body is shown with what it wears, with --scene the figures among their things.""",
-    *ONE_MOTION,
-    option("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent"),
-    option(
-        "--beside",
-        type=Path,
-        metavar="FILE",
-        help="what it was made from, beside it: the recorded skeleton as bones, and the figure that follows it",
-    ),
-    option(
-        "--equipment",
-        default=NOTHING,
-        metavar="WHAT",
-        help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
-    ),
-    option("--out", type=Path, metavar="OUT", help=".html, .glb, .mp4, .gif or .png"),
-    option("--pictures", type=int, default=8, metavar="N", help="of a strip (default: 8)"),
-    epilog="""\
-examples:
-  wholebody clip play walk.bvh
-  wholebody clip play free.npz --ghost walk.npz --out before-after.html
-  wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack
-  wholebody clip play walk-free.npz --beside walk.bvh --equipment pack --out film.mp4
-  wholebody clip play carried.npz --scene two-people.toml""",
-)
 def run(arguments: argparse.Namespace) -> int:
     """Show or write the motion."""
-    import math
-
-    import numpy as np
-
-    from wholebody.base.checks import whole
-    from wholebody.base.errors import InputError
-    from wholebody.base.files import checked_target
-    from wholebody.figures.postures import lowest
-    from wholebody.geometry.shapes import HalfSpace
-    from wholebody.motion.reading import read_clip
-    from wholebody.motion.worn_equipment import put_on
-    from wholebody.view import Viewer
-    from wholebody.view.screenshot import check_movie
-    from wholebody.view.side_by_side import write_filmstrip
-
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)
     if out is not None:
@@ -80,8 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.beside is not None:
         if ghost is not None or (out is not None and out.suffix.lower() == ".png"):
             raise InputError("--beside shows motions side by side, as a page or a movie; leave out --ghost, and .png")
-        viewer = _beside(arguments.beside, clip, scene)
-        return _written(viewer, out)
+        return _written(_beside(arguments.beside, clip, scene), out)
     if clip.figure.root == "free" and arguments.scene is None:
         floor = min(lowest(clip.figure, q) for q in clip.q)  # recordings do not all have it at 0
         scene.add(HalfSpace(), name="floor", at=(0.0, 0.0, floor))
@@ -93,8 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
             viewer.look(tuple(middle + away * np.array((1.6, 1.0, 0.5))), tuple(middle))
         if out is not None and out.suffix.lower() == ".png":
             frames = np.linspace(0, len(clip) - 1, min(arguments.pictures, len(clip))).round().astype(int)
-            beside = None if ghost is None else list(ghost.q[frames])
-            print(f"wrote {write_filmstrip(viewer, list(clip.q[frames]), out, ghosts=beside)}")
+            ghosts = None if ghost is None else list(ghost.q[frames])
+            print(f"wrote {write_filmstrip(viewer, list(clip.q[frames]), out, ghosts=ghosts)}")
             return 0
         viewer.play(clip, ghost=ghost, repeat=math.inf if out is None else 1)
         return _written(viewer, out)
@@ -102,10 +63,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _beside(path: Path, clip: Clip, scene: Scene) -> Viewer:
     """Both motions side by side, and on the left the skeleton of the first where its file has one."""
-    from wholebody.base.errors import InputError
-    from wholebody.motion.reading import read_clip
-    from wholebody.view.side_by_side import beside
-
     before = read_clip(path, clip.figure)
     if len(before) != len(clip):
         raise InputError(f"--beside: {path.name} has {len(before)} frames and not {len(clip)}")
@@ -115,8 +72,6 @@ def _beside(path: Path, clip: Clip, scene: Scene) -> Viewer:
 
 def _written(viewer: Viewer, out: Path | None) -> int:
     """Show what a viewer plays, or write it as a page, glTF or movie."""
-    from wholebody.cli.tables import bar
-
     with viewer:
         if out is None:
             viewer.open()

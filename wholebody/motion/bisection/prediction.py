@@ -16,8 +16,9 @@ from wholebody.methods.base import Method
 from wholebody.motion.avoider import Run
 from wholebody.motion.faults import DEPTH, depth
 from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Effort, Freeze, Hold, Plane
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
@@ -44,7 +45,7 @@ ROOT_WEIGHT = 100.0  # of the root in the effort [1/m^2, 1/rad^2]: as the spine'
 class RootEffort(DistanceMeasure):
     """Squared displacement of the root from the start, which `Effort` leaves out."""
 
-    def resolve(self, scene: Surroundings, start: Array) -> RootEffort:
+    def resolve(self, scene: Scene, start: Array) -> RootEffort:
         """Store the start."""
         weights = np.where(root_freedoms(scene.model), ROOT_WEIGHT, 0.0)
         return filled(self, distance=SquaredDistance.build(start, weights))

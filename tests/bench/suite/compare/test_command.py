@@ -12,7 +12,7 @@ from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.compare.lock import read_lock
 from wholebody.bench.suite.problem_sets.registry import beside
-from wholebody.cli.bench import run as group
+from wholebody.cli.bench import group
 
 
 def bench(*words: str) -> int:

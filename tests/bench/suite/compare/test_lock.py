@@ -10,7 +10,6 @@ import pytest
 
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.statistics import Interval
-from wholebody.bench.suite.compare import lock, report
 from wholebody.bench.suite.compare import run as running
 from wholebody.bench.suite.compare.lock import Locked, differences, in_words, locked, read_lock, shares, write_lock
 from wholebody.bench.suite.compare.results import Chunk, Record, Results
@@ -77,9 +76,9 @@ def test_another_share_ends_with_one(
     path = tmp_path / "lock.json"
     write_lock(path, changed(("robot_arm", "dls", "solved"), Interval(0.7, 0.65, 0.75)))
     monkeypatch.setattr(running, "run", lambda *given: argparse.Namespace(chunks=[], records=[]))
-    monkeypatch.setattr(report, "publish", lambda *given: None)
+    monkeypatch.setattr("wholebody.cli.bench.comparing.publish", lambda *given: None)
     for found, code in ((PUBLISHED, 1), (read_lock(path), 0)):
-        monkeypatch.setattr(lock, "locked", lambda given, found=found: found)
+        monkeypatch.setattr("wholebody.cli.bench.comparing.locked", lambda given, found=found: found)
         assert main(["bench", "compare", "--again", str(path), "--out", str(tmp_path / "out")]) == code
         assert f"{code} differ" in capsys.readouterr().out
 

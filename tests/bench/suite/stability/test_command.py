@@ -11,12 +11,11 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.csv_rows import csv_rows
-from wholebody.bench.suite.adapters import registry
 from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.bench.suite.stability.asking import Cell, ask, judge
 from wholebody.bench.suite.stability.catalogue import cases
 from wholebody.bench.suite.stability.verdict import Result, report, result
-from wholebody.cli.bench import stability
+from wholebody.cli.bench import group
 
 CASES = ("out-by-1-mm", "edge-on-edge", "not-a-number")
 METHODS = ("qp", "ccd")
@@ -24,8 +23,8 @@ METHODS = ("qp", "ccd")
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    stability.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["stability", *words])
+    group.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["bench", "stability", *words])
     return int(arguments.run(arguments))
 
 
@@ -46,7 +45,7 @@ def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_without_names_those_methods_of_the_page_are_asked_that_are_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(registry, "installed", METHODS.__contains__)
+    monkeypatch.setattr("wholebody.cli.bench.hard_cases.installed", METHODS.__contains__)
     assert bench("--cases", "not-a-number", "--out", str(tmp_path)) == 0
     rows = csv_rows(tmp_path / "stability.csv")
     assert {row["tool"] for row in rows} == {*METHODS}

@@ -18,7 +18,8 @@ from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.step_program import QPStep
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.scene.scene import Scene
+from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.residuals import point_rows
 
 RETARGET = "retarget"
@@ -96,7 +97,7 @@ class MovingPoint(Goal):
         self.frame, self.target = frame, target
         self._id = self._joint = 0
 
-    def resolve(self, scene: Surroundings, start: Array) -> MovingPoint:
+    def resolve(self, scene: Scene, start: Array) -> MovingPoint:
         """Find the frame."""
         index = scene.figure.frame_id(self.frame)
         return filled(self, _id=index, _joint=int(scene.model.frames[index].parentJoint))

@@ -11,10 +11,18 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
+from wholebody.bench.measure import motion, scaling, step
+from wholebody.bench.measure.files import ABOUT, compare, read, totals
+from wholebody.bench.measure.motion import EQUIPMENT, SYNTHETIC, recorded, recordings, synthetic
+from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
+from wholebody.bench.measure.world import ENGINES, all_throws, drops, installed, measure, throw_summary
 from wholebody.bench.rows import Panel, Row, across, chart, in_words, only, report, texts
+from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
 from wholebody.bench.tables import machine, write_rows
-from wholebody.cli.bench.command import Chart, listed, measuring, publish
-from wholebody.cli.command import count, flag, option
+from wholebody.cli.bench.command import Chart, publish
+from wholebody.figures import load
+from wholebody.motion.avoidance import METHODS
+from wholebody.motion.batch import BatchProgress, avoid_many
 
 
 def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:
@@ -27,22 +35,8 @@ def _charts(name: str, panels: Sequence[Panel], caption: str) -> dict[str, Chart
     return {name: Chart(partial(chart, panels), caption)} if panels else {}
 
 
-@measuring(
-    "step",
-    "one step of tracking by every tool",
-    "The same 200-step reach by every installed tool, interleaved, judged independently. With --figure these figures "
-    "replace the standing human; tools that do not take one say why.",
-    listed("--figure", "URDF or MJCF files, or names of figures", "FILE"),
-    count("--repeats", 5, "timed runs of every tool"),
-    option("--steps", type=int, default=200, metavar="N", help="of each run (default: 200)"),
-    listed("--tools", "only these (default: all that are installed)"),
-)
-def step(arguments: argparse.Namespace) -> None:
+def measure_step(arguments: argparse.Namespace) -> None:
     """Measure steps."""
-    from wholebody.bench.measure import step
-    from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
-    from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
-
     tools = chosen_tools(arguments.tools)
     repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
     facts = machine() | {"steps": str(steps), "repeats": str(repeats)}
@@ -66,18 +60,8 @@ def step(arguments: argparse.Namespace) -> None:
     publish(name, text, arguments, facts=facts, tables=rows, charts=charts, page=None if figures else "results.md")
 
 
-@measuring(
-    "scaling",
-    "time of a step and a solve against joints, pieces and things, with exponents",
-    "Chains of 5 to 200 joints (500 bodies without a model of joints), 1 to 32 pieces a segment, 10 to "
-    "5000 things around, and the exponents with which times grow.",
-    count("--repeats", 5, "timed solves each"),
-    listed("--methods", "methods (default: qp newton ccd placo)"),
-)
-def scaling(arguments: argparse.Namespace) -> None:
+def measure_scaling(arguments: argparse.Namespace) -> None:
     """Measure, fit, draw."""
-    from wholebody.bench.measure import scaling
-
     methods = chosen(arguments.methods, ("qp", "newton", "ccd", "placo"), "--methods")
     repeats = 2 if arguments.quick else arguments.repeats
     sizes = {name: grown[: 3 if arguments.quick else None] for name, grown in scaling.SIZES.items()}
@@ -98,39 +82,15 @@ def scaling(arguments: argparse.Namespace) -> None:
     publish("scaling", text, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
 
 
-CLIPS = (
-    option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),
-    listed("--only", "names of clips (default: all)", "CLIP"),
-)
-
-
 def clips(arguments: argparse.Namespace, most: int | None) -> dict[str, Path | None]:
     """The chosen clips, at most so many: their recordings, None for one that needs none."""
-    from wholebody.bench.measure.motion import SYNTHETIC, recordings
-
     known: dict[str, Path | None] = dict.fromkeys(SYNTHETIC)
     known |= {path.stem: path for path in recordings(arguments.clips)}
     return {name: known[name] for name in chosen(arguments.only, known, "--only")[:most]}
 
 
-@measuring(
-    "motion",
-    "clips freed of collisions by each method, with each piece of equipment",
-    "Free clips of collisions by each method, with each piece of equipment, as `wholebody clip avoid` does, and sum up "
-    "deviation, jerk, sliding and time: clips that need no recordings, and the recordings of a folder. An interrupted "
-    "run continues from its folder.",
-    *CLIPS,
-    listed("--equipment", "what is worn (default: all)"),
-    listed("--methods", "methods (default: all)"),
-    count("--jobs", 1, "cases at a time"),
-)
-def motion(arguments: argparse.Namespace) -> None:
+def measure_motion(arguments: argparse.Namespace) -> None:
     """Free, or continue; --quick takes two clips with two pieces of equipment."""
-    from wholebody.bench.measure import motion
-    from wholebody.bench.measure.motion import EQUIPMENT, recorded, synthetic
-    from wholebody.figures import load
-    from wholebody.motion.avoidance import METHODS
-    from wholebody.motion.batch import BatchProgress, avoid_many
 
     def tell(now: BatchProgress) -> None:
         if now.case is not None:
@@ -152,19 +112,8 @@ WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engin
 """Parts of `wholebody bench world`, and the titles of their tables."""
 
 
-@measuring(
-    "world",
-    "things that move by themselves: throws at a person, drops beside MuJoCo and Rapier",
-    "Throw things at a person who stands, walks or is dragged; drop, slide and stack the same things in wholebody, "
-    "MuJoCo and Rapier. The whole takes about ten minutes of one processor.",
-    listed("--parts", "throws, drops (default: all)", "PART"),
-    listed("--only", "names of drops (default: all)", "DROP"),
-    listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
-)
-def world(arguments: argparse.Namespace) -> int:
+def measure_world(arguments: argparse.Namespace) -> int:
     """Measure; --quick takes three drops for half a second, and one throw of each kind."""
-    from wholebody.bench.measure.world import throw_summary
-
     found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
     given = _world(arguments)
     make_folder(arguments.out)
@@ -185,8 +134,6 @@ def world(arguments: argparse.Namespace) -> int:
 
 def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     """What measures each part; names are checked before anything is measured."""
-    from wholebody.bench.measure.world import ENGINES, all_throws, drops, installed, measure
-
     quick = arguments.quick
     known = {drop.name: drop for drop in drops()}
     names = chosen(arguments.only, known, "--only")[: 3 if quick else None]
@@ -198,20 +145,8 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     }
 
 
-@measuring(
-    "files",
-    "what is read of the files of a folder",
-    "Read every robot, mesh and recording below a folder; recordings are retargeted to the person. The table has what "
-    "was read, the sentence by which the rest is refused, the errors of bones, and the processor's time.",
-    option("folder", type=Path, metavar="FOLDER", help="of the files"),
-    count("--frames", 60, "frames of each recording that are retargeted"),
-    flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
-    listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
-)
-def files(arguments: argparse.Namespace) -> int:
+def measure_files(arguments: argparse.Namespace) -> int:
     """Read; 1 where a file ends in anything but an answer or a sentence."""
-    from wholebody.bench.measure.files import read
-
     if not arguments.folder.is_dir():
         raise InputError(f"{arguments.folder}: is no folder; give one with files")
     if arguments.compare:
@@ -232,9 +167,6 @@ def files(arguments: argparse.Namespace) -> int:
 
 def _compared(arguments: argparse.Namespace) -> int:
     """Follow recordings by both tools; figures of files may go about freely."""
-    from wholebody.bench.measure.files import ABOUT, compare, totals
-    from wholebody.figures import load
-
     names = arguments.figure or ["human"]
     figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
     rows = []
