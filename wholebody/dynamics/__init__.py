@@ -10,7 +10,8 @@ A frame of `RigidBodies` is made in steps. Each step:
    scaled towards rest, or towards the motion of the whole as one body, which keeps its momentum;
 5. moves the bodies (`motion_kernel`), the free ones with constant energy and angular momentum;
 6. tests whether pieces are, or were on the way, in each other (`passing`): directions that part two pieces at both
-   ends of the step part them between. If one pair fails, the step is repeated with the points where it met, or halved;
+   ends of the step part them between. If pieces are in each other at its end, the step is repeated with the points
+   there; if that does not help, or a pair fails on the way, it is halved;
 7. closes joints in velocities (`joints`), and lets slow islands sleep at the end of the frame (`sleeping`).
 
 The loops take records: `Bodies`, `Rows`, `JointPoints`, `Laws`, `Limits`, `SweptPoints`, `Way`.

@@ -25,6 +25,7 @@ from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.figure_points import Moved, Points, axes_of
 from wholebody.dynamics.frame import EngineFrame, Event
+from wholebody.dynamics.pieces import places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.figures.state import free_roots
@@ -209,10 +210,7 @@ class Articulated:
         rows = self._rows.rows(near)
         kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
         contact, wrench = rows.contact[kept], rows.wrench[kept]
-        middle = 0.5 * (near.point_a + near.point_b)[contact]
-        normal = wrench[:, :3]
-        height = (normal * middle).sum(axis=1)
-        place = cross(normal, wrench[:, 3:]) + height[:, None] * normal
+        normal, place = wrench[:, :3], places(wrench, near, contact)
         met = [(workspace.owners[first], workspace.owners[second]) for first, second in near.pair[contact].tolist()]
         touched = {name for both in met for name in both if name in names}
         owners, gap = met, rows.gap[kept]

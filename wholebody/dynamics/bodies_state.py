@@ -62,13 +62,6 @@ class BodiesState:
         """Go back to what `copies` gave."""
         self.bodies.position[:], self.bodies.rotation[:], self.bodies.twist[:] = kept
 
-    def between(self, kept: tuple[Array, Array, Array], share: float) -> None:
-        """Go to where a share of the way from what `copies` gave has been covered; the velocities stay."""
-        for number in np.flatnonzero(self.active):
-            turn = pin.log3(self.bodies.rotation[number] @ kept[1][number].T)
-            self.bodies.rotation[number] = pin.exp3(share * turn) @ kept[1][number]
-        self.bodies.position[:] = kept[0] + share * (self.bodies.position - kept[0])
-
     def local(self, body: Indices, point: Array) -> Array:
         """Points (m, 3) in the axes of bodies (m,), from their centres of mass."""
         return np.asarray(np.einsum("cij,ci->cj", self.bodies.rotation[body], point - self.bodies.position[body]))

@@ -14,9 +14,10 @@ and inertia, with what it carries; friction is capped where sliding ends.
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, exp, sin, sqrt
+from math import exp
 from typing import Annotated
 
 import numpy as np
@@ -61,7 +62,7 @@ class Spring(Checked):
         """The matrix (2, 2) that takes x and x' over a time of so many seconds.
 
         With a = R / 2m and s^2 = a^2 - K / m it is exp(-a t) [[C + a S, S], [-K / m S, C - a S]], C = cosh(s t) and
-        S = sinh(s t) / s, or cos and sin where s^2 is negative.
+        S = sinh(s t) / s, also where s is imaginary.
         """
         time = number(time, "time", *TIME_STEP, "s")
         rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
@@ -69,14 +70,11 @@ class Spring(Checked):
         if abs(square) <= 1e-6 * rate * rate:  # the two roots count as one
             c = exp(-rate * time)
             s = c * time
-        elif square < 0.0:
-            turn = sqrt(-square)
-            c, s = exp(-rate * time) * cos(turn * time), exp(-rate * time) * sin(turn * time) / turn
         else:
-            root = sqrt(square)
-            slow = exp(-stiff / (rate + root) * time)  # (rate - root) without the loss of digits
-            fast = exp(-(rate + root) * time)
-            c, s = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
+            root = cmath.sqrt(square)
+            slow = cmath.exp(-stiff / (rate + root) * time)  # (rate - root) without the loss of digits
+            fast = cmath.exp(-(rate + root) * time)
+            c, s = 0.5 * (slow + fast).real, (0.5 * (slow - fast) / root).real
         return np.array([[c + rate * s, s], [-stiff * s, c - rate * s]])
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.compiled import compiled
-
-FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
+from wholebody.base.compiled import compiled, with_loops
+from wholebody.dynamics.solve_kernel import FAST, along_way
 
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
@@ -69,22 +67,13 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
             break
         share, last = square / last, square
         for c in range(count):
-            if share >= 1.0:
-                way[c, 0], way[c, 1], way[c, 2] = 0.0, 0.0, 0.0
-                continue
-            step, one, two = share * way[c, 0], share * way[c, 1], share * way[c, 2]
-            for axis in range(3):
-                way[c, axis] = share * way[c, axis] + impulse[c, axis] - before[c, axis]
+            step, one, two = along_way(share, way[c], impulse[c], before[c])
             if step != 0.0 or one != 0.0 or two != 0.0:
-                impulse[c, 0] += step
-                impulse[c, 1] += one
-                impulse[c, 2] += two
                 _push(3 * c, step, one, two, mobility, velocity)
     return impulse
 
 
-@lru_cache(maxsize=1)
-def compiled_kernel() -> SimpleNamespace:
-    """Compile or load the loop."""
+@with_loops(__name__)
+def compiled_kernel(_: Any) -> None:
+    """The loop."""
     solve(np.eye(3), np.zeros(3), np.zeros(1), np.zeros(1), 1, 1e-9)
-    return SimpleNamespace(solve=solve)

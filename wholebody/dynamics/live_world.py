@@ -104,7 +104,7 @@ class LiveWorld:
         known(name, {*self.handles, *self.things}, "handle")
         self.taken = name
         if name in self.handles:
-            self._goal(name, self._tracked_place(name))
+            self._goal(name, self._handle_place(self._tracked, name))
             if self._tracker is None:
                 self._prepare()
 
@@ -167,7 +167,7 @@ class LiveWorld:
         known(name, {*self.handles, *self.things}, "handle")
         if name in self.things:
             return np.array(self.scene.objects[name].placement.translation)
-        return self._handle_place(self._state, self.q, name)
+        return self._handle_place(self.q, name)
 
     def report(self) -> LiveFrame:
         """What there is to say without a frame."""
@@ -179,12 +179,9 @@ class LiveWorld:
         )
         return f"{doing}: {self._note}" if self._note else doing
 
-    def _handle_place(self, state: Any, q: Array, name: str) -> Array:
+    def _handle_place(self, q: Array, name: str) -> Array:
         handle = self._subject.handles[name]
-        return np.array(state.update(q).data.oMi[handle.joint].act(handle.local.translation))
-
-    def _tracked_place(self, name: str) -> Array:
-        return self._handle_place(self._state, self._tracked, name)
+        return np.array(self._state.update(q).data.oMi[handle.joint].act(handle.local.translation))
 
     # ---- a frame
 
@@ -193,7 +190,7 @@ class LiveWorld:
         if name not in self._goals:
             self._tracker = None
         if clamped:  # from where the handle is: a goal that ran far out of reach would be long on its way back
-            here = self._tracked_place(name)
+            here = self._handle_place(self._tracked, name)
             length = float(np.linalg.norm(place - here))
             place = here + (place - here) * min(1.0, FASTEST * self.world.dt / max(length, 1e-12))
         self._goals[name] = place

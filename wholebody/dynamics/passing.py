@@ -37,13 +37,6 @@ class StepStart:
             self.near = self._finder.near(self.kept[0], self.kept[1], self.margin, self._active)
 
 
-class PassingCheck(NamedTuple):
-    """Whether no pieces overlap by over `PASSING` on the way; else shares `meetings` where they may meet."""
-
-    free: bool
-    meetings: tuple[float, ...] = ()
-
-
 class Way(NamedTuple):
     """How bodies moved during a step, and the near pairs at both ends of it."""
 
@@ -58,10 +51,10 @@ class Way(NamedTuple):
     fall: float  # sag of the relative displacement because of gravity, metres
 
 
-def check_passing(
+def free_between(
     state: BodiesState, before: StepStart, after: Contacts, margin: Array, travel: Array, time: float, gravity: float
-) -> PassingCheck:
-    """Whether pieces can have been deeper than `PASSING` in each other on the way of a step, and where.
+) -> bool:
+    """Whether no pieces can have been deeper than `PASSING` in each other on the way of a step.
 
     Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body moved more than its travel (n,).
     """
@@ -80,14 +73,12 @@ def check_passing(
     )  # fmt: skip
     doubts = np.zeros(len(near.pair), dtype=bool)
     if doubtful(way, pieces.swept, doubts) > 50:  # more are not followed
-        return PassingCheck(False)
-    met = [_meeting(state, before, pair, way) for pair in near.pair[doubts].tolist()]
-    shares = tuple(sorted({max(share, 0.1) for share in met if share is not None}))
-    return PassingCheck(not shares, shares)
+        return False
+    return not any(_can_meet(state, before, pair, way) for pair in near.pair[doubts].tolist())
 
 
-def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -> float | None:
-    """The share of a step at which two pieces meet, or up to which they surely do not; None if they do not meet."""
+def _can_meet(state: BodiesState, before: StepStart, pair: list[int], way: Way) -> bool:
+    """Whether two pieces can have met on the way of a step, which is followed in parts."""
     pieces, placements = state.pieces, way.placement[0]
     first, second = pair
     a, b = (int(pieces.body[k]) for k in pair)
@@ -112,7 +103,7 @@ def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -
         poses = [coal.Transform3s(placed[k, :3].T, placed[k, 3]) for k in pair]
         distance = coal.distance(shapes[0], poses[0], shapes[1], poses[1], request, result)
         if distance < -PASSING:
-            return at
+            return True
         normal, part = np.array(result.normal), min(2.0 * part, 1.0 - at)
         # seen from a body that turns by w, a point at r with velocity v has at most the acceleration
         # |w|^2 |r| + 2 |w| |v| beside its own; a path sags by an eighth of that
@@ -121,7 +112,7 @@ def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -
             place(at + part)
             looks += 1
             if looks > 64:  # what would need more is doubtful
-                return at
+                return True
             if any(
                 min(distance, float(apart(first, second, along, placed, pieces.swept))) - part * part * bend > -PASSING
                 for along, bend in (
@@ -132,7 +123,7 @@ def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -
                 break
             part *= 0.5
         at += part
-    return None
+    return False
 
 
 @compiled()

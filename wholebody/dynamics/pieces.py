@@ -223,6 +223,13 @@ class ContactPoints(NamedTuple):
             linked = joined
 
 
+def places(wrench: Array, contacts: Contacts, owner: Indices) -> Array:
+    """Points (m, 3) of rows (m, 6), normal and moment, half way between the surfaces of their contacts (m,)."""
+    normal, middle = wrench[:, :3], 0.5 * (contacts.point_a + contacts.point_b)
+    height = (normal * middle[owner]).sum(axis=1)
+    return np.asarray(cross(normal, wrench[:, 3:]) + height[:, None] * normal)
+
+
 class ContactFinder:
     """Finds near pairs and their contact points for one run of the engine."""
 
@@ -234,11 +241,6 @@ class ContactFinder:
         self._rows = ContactRowBuilder(pieces.table, 6, 0.995)
         compiled_kernel()  # not in the middle of a motion
         self._bodies = pieces.body[pieces.table.pairs]
-
-    @property
-    def asked(self) -> int:
-        """How many distances coal was asked for."""
-        return self._proximity.asked
 
     def near(self, position: Array, rotation: Array, margin: Array, active: Mask) -> Contacts:
         """Pairs that are nearer than the margins (n,) of both bodies together, metres, and have an active body."""
@@ -255,9 +257,7 @@ class ContactFinder:
         rows = self._rows.rows(contacts)
         owner = rows.contact
         normal = rows.wrench[:, :3].copy()
-        middle = 0.5 * (contacts.point_a + contacts.point_b)
-        height = (normal * middle[owner]).sum(axis=1)
-        point = cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
+        point = places(rows.wrench, contacts, owner)
         kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `TOUCH`
         owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]

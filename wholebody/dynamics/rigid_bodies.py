@@ -23,7 +23,7 @@ from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
 from wholebody.dynamics.joints import Joints
-from wholebody.dynamics.passing import StepStart, check_passing
+from wholebody.dynamics.passing import StepStart, free_between
 from wholebody.dynamics.pieces import ContactFinder, ContactPoints, Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram, compiled_kernel
@@ -266,14 +266,12 @@ class RigidBodies:
             if halvings == 6:
                 record.given_up += 1
                 break
-            shares: tuple[float, ...] = (1.0,)
-            if least >= -(1e-4 if predicted else 2e-5):  # m: less is made again more often, and parted less often
-                free, shares = check_passing(state, before, self._near, self._margin, self._travel(time), time, weight)
-                if free:
-                    break
-            start, met = program.remembered(time), bool(shares) and predicted < 2
+            deep = least < -(1e-4 if predicted else 2e-5)  # m: less is made again more often, and parted less often
+            if not deep and free_between(state, before, self._near, self._margin, self._travel(time), time, weight):
+                break
+            start, met = program.remembered(time), deep and predicted < 2
             if met:
-                self._add_predicted(program, before, time, shares)
+                program.add_points(self._finder.points(self._near.nearer(LEAST_GAP)), time)
                 predicted += 1
             state.restore(before.kept)
             if met:
@@ -328,16 +326,6 @@ class RigidBodies:
             hold -= off / time
             start = program.remembered(time)
             state.restore(kept)
-
-    def _add_predicted(self, program: StepProgram, before: StepStart, time: float, shares: tuple[float, ...]) -> None:
-        """Let a program know the contact points where pieces are in each other at shares of its step."""
-        state, end = self.state, self.state.copies()
-        for share in shares:
-            if share < 1.0:
-                state.between(before.kept, share)
-                self._find_near(STEP)
-            program.add_points(self._finder.points(self._near.nearer(LEAST_GAP)), time, share)
-            state.restore(end)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
         points, state, number = program.points, self.state, events[:, 0].astype(np.intp)  # squeezed bodies: thousands

@@ -100,6 +100,21 @@ def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tupl
     return change, step * step * each + (one * one + two * two) * side, True
 
 
+@compiled(error_model="numpy", fastmath=FAST, inline="always")
+def along_way(share: float, way: Array, impulse: Array, before: Array) -> tuple[float, float, float]:
+    """Go on by a share of the way (3,) that an impulse (3,) has gone; by how much along each axis."""
+    if share >= 1.0:
+        way[0], way[1], way[2] = 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0
+    one, two, three = share * way[0], share * way[1], share * way[2]
+    for row in range(3):
+        way[row] = share * way[row] + impulse[row] - before[row]
+    impulse[0] += one
+    impulse[1] += two
+    impulse[2] += three
+    return one, two, three
+
+
 @compiled(error_model="numpy", fastmath=FAST)
 def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: Limits) -> int:
     """Solve the program of the points `chosen` (k,); how many sweeps it took.
@@ -128,17 +143,9 @@ def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array,
         share, last = square / last, square
         for place in range(count):
             c = chosen[place]
-            if share >= 1.0:
-                way[place, 0], way[place, 1], way[place, 2] = 0.0, 0.0, 0.0
-                continue
-            one, two, three = share * way[place, 0], share * way[place, 1], share * way[place, 2]
-            for row in range(3):
-                way[place, row] = share * way[place, row] + impulse[c, row] - before[place, row]
+            one, two, three = along_way(share, way[place], impulse[c], before[place])
             if one != 0.0 or two != 0.0 or three != 0.0:
                 _push(c, one, two, three, rows, twist)
-                impulse[c, 0] += one
-                impulse[c, 1] += two
-                impulse[c, 2] += three
     return limits.sweeps
 
 

@@ -65,7 +65,6 @@ class StepProgram:
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
-        self._until = np.full(len(points.gap), np.inf)  # s: for which each gap has to last, at most
         self._rows = self._point_rows(state.bodies.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
@@ -101,19 +100,17 @@ class StepProgram:
         """At most 1,000 sweeps of an island, and 20,000 visits of points: more are more exact and slower."""
         return Limits(tolerance, min(1000, 20_000 // max(len(self._rows.bodies), 1) + 1))
 
-    def add_points(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
-        """Add contact points at a share of a step of this time, with gaps that lead there with its velocities."""
+    def add_points(self, points: ContactPoints, time: float) -> None:
+        """Add contact points at the end of a step of this time, with gaps that lead there with its velocities."""
         late = StepProgram(self.state, points, self.gravity, self.joints)
         late.read_velocities(~self.pushed())
-        until = share * time
-        gap = points.gap - until * late.speed + 0.5 * late._pull * until**2
+        gap = points.gap - time * late.speed + 0.5 * late._pull * time**2
         count, own, rows = len(self.points.gap), late._rows, self._rows
         self._local = np.concatenate([self._local, late._local])
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
         self._jammed = np.zeros(count + len(gap), dtype=bool)
         self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
-        self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
 
@@ -159,7 +156,7 @@ class StepProgram:
         twist, moving = state.bodies.twist, state.bodies.moving
         began = twist.copy()
         state.velocity[moving] += time * self.gravity
-        target = np.where(points.gap > SKIN, (SKIN - points.gap) / np.minimum(time, self._until), 0.0)
+        target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
         if together:

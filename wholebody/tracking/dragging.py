@@ -19,7 +19,7 @@ from wholebody.methods.base import Method
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
-from wholebody.tracking.drag import Drag
+from wholebody.tracking.drag import Drag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, moving_goal, retarget
 
@@ -136,35 +136,26 @@ def drag_along(
     function(progress, "progress")
     drag = Drag(problem, method, goal=goal, dt=dt)
     aims = [_aim(problem, goal, place) for place in targets]
-    postures, left = [drag.q], [np.inf]
-    wall: list[float] = []
-    cpu: list[float] = []
-    iterations: list[int] = []
-    paths: list[tuple[tuple[float, Array], ...]] = [()]
+    start, frames, cpu, left = drag.q, list[DragFrame](), list[float](), [np.inf]
     # A figure that lags behind gets 120 frames at most, while it is over 1e-3 off and comes nearer by 1e-4 (m, rad).
-    while len(wall) < len(aims) or (len(wall) < len(aims) + 120 and left[-1] > 1e-3 and left[-2] - left[-1] > 1e-4):
+    while len(cpu) < len(aims) or (len(cpu) < len(aims) + 120 and left[-1] > 1e-3 and left[-2] - left[-1] > 1e-4):
         began = time.thread_time()
-        frame = drag.to(aims[min(len(wall), len(aims) - 1)])
+        frames.append(drag.to(aims[min(len(cpu), len(aims) - 1)]))
         cpu.append(time.thread_time() - began)
-        wall.append(frame.seconds)
-        postures.append(frame.q)
-        iterations.append(frame.iterations)
-        paths.append(frame.path)
-        left.append(frame.error)
+        left.append(frames[-1].error)
         if progress is not None:
-            progress(min(len(wall), len(aims)))
-    late = len(wall) - len(aims)
+            progress(min(len(cpu), len(aims)))
     end = drag.finish()
     return Dragged(
-        q=np.array([*postures, end.q]),
-        targets=np.vstack([targets, np.tile(targets[-1], (late, 1))]),
+        q=np.array([start, *(frame.q for frame in frames), end.q]),
+        targets=np.vstack([targets, np.tile(targets[-1], (len(cpu) - len(aims), 1))]),
         dt=dt,
         method=end.method,
-        seconds=np.array(wall),
+        seconds=np.array([frame.seconds for frame in frames]),
         cpu_seconds=np.array(cpu),
-        iterations=np.array(iterations, dtype=np.intp),
+        iterations=np.array([frame.iterations for frame in frames], dtype=np.intp),
         end=end,
-        paths=(*paths, ()),
+        paths=((), *(frame.path for frame in frames), ()),
     )
 
 

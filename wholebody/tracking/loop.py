@@ -208,13 +208,9 @@ class FrameLoop(NotCopyable):
     def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":
             return QPStrategy(self.scene, self.shown, dt, rigid, self._touching)
-        if rigid:
-            from wholebody.tracking.ccd_strategy import RigidTranslation
+        from wholebody.tracking.ccd_strategy import CCDStrategy, RigidTranslation
 
-            return RigidTranslation(self.scene)
-        from wholebody.tracking.ccd_strategy import CCDStrategy
-
-        return CCDStrategy(self.scene, self.shown, dt, seed)
+        return RigidTranslation(self.scene) if rigid else CCDStrategy(self.scene, self.shown, dt, seed)
 
 
 def invalid_reason(scene: Scene, q: Array) -> str:
