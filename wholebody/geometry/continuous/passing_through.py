@@ -49,9 +49,6 @@ class Queries(Protocol):
     def near(self, q: Array, within: float) -> Contacts:
         """Every pair nearer than `within` metres at a posture (nq,)."""
 
-    def placements(self, q: Array) -> Array:
-        """Placements of all pieces at a posture (nq,); see `Contacts.placements`."""
-
 
 def is_free(
     queries: Queries, before: Array, after: Array, unswept: float, over: Callable[[], bool] = bool
@@ -119,13 +116,7 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
     """Whether some pair has changed sides during a motion from q0 to q1 (nq,); the state of `queries` is moved."""
     # Halving decides most pairs at a tenth of a sweep's cost. The distance shows a pair that touches at the end.
-    table = queries.table
-    moved = far_moved(table, before, after)
-    if not len(moved):
-        return False
-    moved = moved[~_passing_by(queries, before, after, q0, q1, moved)]
-    doubtful = _not_separated(table, before, after, moved)
-    # of a motion before doubtful pairs are swept
+    doubtful = doubtful_pairs(queries.table, before, after)
     return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, 3)
 
 
@@ -172,39 +163,6 @@ def first_passed(
 
 def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
-    return _not_separated(table, before, after, far_moved(table, before, after))
-
-
-def _passing_by(
-    queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, pairs: Indices
-) -> NDArray[np.bool_]:
-    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle."""
-    # The centres' path is approximated by two chords, with twice the deviation of a parabola as a margin.
-    table = queries.table
-    halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
-    first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
-    start, middle, end = (
-        placements[first, 3] - placements[second, 3] for placements in (before.placements, halfway, after.placements)
-    )
-    bow = middle - 0.5 * (start + end)
-    room = np.minimum(_nearest(start, middle), _nearest(middle, end)) - 0.5 * np.sqrt(np.einsum("ij,ij->i", bow, bow))
-    apart: NDArray[np.bool_] = room > table.reach[first] + table.reach[second]
-    return apart
-
-
-def _nearest(start: Array, end: Array) -> Array:
-    """Least distance (k,) of the origin from the segments between points (k, 3)."""
-    along = end - start
-    share = -np.einsum("ij,ij->i", start, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
-    point = start + np.clip(share, 0.0, 1.0)[:, None] * along
-    nearest: Array = np.sqrt(np.einsum("ij,ij->i", point, point))
-    return nearest
-
-
-def _not_separated(table: PairTable, before: QueryResult, after: QueryResult, doubtful: Indices) -> Indices:
-    """The pairs that no plane separates before and after."""
-    if not len(doubtful):
-        return doubtful
+    moved = far_moved(table, before, after)
     # m: overlap that is allowed between two postures; half of the thinnest plate that counts
-    left: Indices = doubtful[~separated(table, before, after, doubtful, 5e-4)]
-    return left
+    return moved[~separated(table, before, after, moved, 5e-4)] if len(moved) else moved
