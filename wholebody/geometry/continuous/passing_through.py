@@ -1,9 +1,8 @@
 """Test whether a motion passes through something: proof for most pairs, a continuous sweep for the others.
 
 Two convex pieces that are d0 apart before a motion and d1 after it can only have changed sides if they moved against
-each other by d0 + d1 and the widths of both. If a motion is longer (a fast hand, a thin plate), the plane that
-separates them before it, fixed to one piece, may still separate them after it, up to the height of the arcs that points
-describe. The remaining pairs are swept.
+each other by d0 + d1 and the widths of both. If a motion is longer (a fast hand, a thin plate), it is halved a few
+times. The remaining pairs are swept.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved, separated
+from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved
 from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
@@ -116,7 +115,7 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
     """Whether some pair has changed sides during a motion from q0 to q1 (nq,); the state of `queries` is moved."""
     # Halving decides most pairs at a tenth of a sweep's cost. The distance shows a pair that touches at the end.
-    doubtful = doubtful_pairs(queries.table, before, after)
+    doubtful = far_moved(queries.table, before, after)
     return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, 3)
 
 
@@ -133,7 +132,7 @@ def _halved(
     if (inside & (end[doubtful] > -OVERLAP)).any():
         return True
     for first, last, start, stop in ((before, middle, q0, q), (middle, after, q, q1)):
-        still = np.intersect1d(doubtful_pairs(table, first, last), doubtful, assume_unique=True)
+        still = np.intersect1d(far_moved(table, first, last), doubtful, assume_unique=True)
         if len(still) and _halved(queries, first, last, start, stop, still, halvings - 1):
             return True
     return False
@@ -159,10 +158,3 @@ def first_passed(
     moved = far_moved(table, before, after)
     doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
     return queries.sweep.first_contact(q0, q1, doubtful, overlap) if len(doubtful) else None
-
-
-def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
-    """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
-    moved = far_moved(table, before, after)
-    # m: overlap that is allowed between two postures; half of the thinnest plate that counts
-    return moved[~separated(table, before, after, moved, 5e-4)] if len(moved) else moved
