@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.placement import quaternions
+from wholebody.motion.thing_tracks import steady
 from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
 from wholebody.view.server import Command, Server, Store
@@ -188,23 +189,14 @@ def _motion(path: str, matrices: Array, *, steps: bool = False) -> list[Track]:
     if (np.ptp(matrices, axis=0) < 1e-9).all():
         return []
     scales = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    turns = steady(quaternions(matrices[:, :3, :3] / scales[:, None, :]))
     tracks = [
         Track(path, "position", "vector3", matrices[:, :3, 3], steps),
-        Track(
-            path, "quaternion", "quaternion", continuous_quaternions(matrices[:, :3, :3] / scales[:, None, :]), steps
-        ),
+        Track(path, "quaternion", "quaternion", turns, steps),
     ]
     if (np.ptp(scales, axis=0) > 1e-9).any():
         tracks.append(Track(path, "scale", "vector3", scales, steps))
     return tracks
-
-
-def continuous_quaternions(rotations: Array) -> Array:
-    """Unit quaternions (n, 4) of rotations (n, 3, 3), neighbours on the same half of the sphere."""
-    q = quaternions(rotations)
-    flips = np.sign(np.einsum("ni,ni->n", q[1:], q[:-1]))
-    q[1:] *= np.cumprod(np.where(flips == 0, 1.0, flips))[:, None]
-    return q
 
 
 class Instances(NamedTuple):
