@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import http.client
+import os
 import re
+import signal
 import socket
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -171,3 +174,20 @@ def test_closing_ends_the_server_and_can_be_repeated(exhibit: Any, tmp_path: Pat
         status(url)
     viewer.show(exhibit.posture(1))
     assert viewer.save(tmp_path / "scene.html").stat().st_size > 200_000
+
+
+def test_closing_ends_the_server_while_a_forked_process_holds_its_socket(exhibit: Any) -> None:
+    """Such as those of `multiprocessing`."""
+    viewer = Viewer(exhibit)
+    url = viewer.url
+    forked = os.fork()
+    if forked == 0:
+        time.sleep(60)
+        os._exit(0)
+    try:
+        viewer.close()
+        with pytest.raises(urllib.error.URLError, match="refused"):
+            status(url)
+    finally:
+        os.kill(forked, signal.SIGKILL)
+        os.waitpid(forked, 0)

@@ -9,10 +9,12 @@ import atexit
 import importlib.util
 import math
 import re
+import socket
 import struct
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from wholebody.base import checks
@@ -149,8 +151,6 @@ class Guard:
     """
 
     def __init__(self, host: str) -> None:
-        import socket
-
         names = {*LOCAL, host.lower()}
         if host not in LOCAL:
             names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
@@ -267,6 +267,9 @@ class Server:
         server = HTTPServer(self._application(host))
         server.add_sockets(sockets)
         await self._stopped.wait()
+        for one in sockets:
+            with suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)  # a forked process may hold it too
         server.stop()
         for tab in [*self.tabs]:
             tab.close()
