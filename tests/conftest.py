@@ -282,8 +282,9 @@ def _start_warm(environment: Mapping[str, str]) -> runner.Started:
     ours, theirs = socket.socketpair()
     output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
     arguments = (theirs, output.fileno(), environment, os.getpid())
-    process = multiprocessing.get_context("fork").Process(target=_serve_warm, args=arguments, daemon=True)
+    process: Any = multiprocessing.get_context("fork").Process(target=_serve_warm, args=arguments, daemon=True)
     process.start()
+    process.wait = lambda: process.join() or process.exitcode or 0  # as a `subprocess.Popen` has it
     theirs.close()
     return runner.Started(process, Connection(ours.detach()), output)
 

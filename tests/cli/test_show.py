@@ -32,8 +32,8 @@ def free_port() -> int:
 def showing(*arguments: str) -> tuple[subprocess.Popen[str], str]:
     """A process that shows a hand, and the address it says; no browser of the desktop is opened."""
     code = (
-        "import sys; from wholebody.cli import main; from wholebody.view.sender import Sender; "
-        f"Sender.wait_until_closed.__defaults__ = ({GRACE},); sys.exit(main(sys.argv[1:]))"
+        "import sys; from wholebody.cli import main; from wholebody.view.server import Server; "
+        f"Server.wait_until_closed.__defaults__ = ({GRACE},); sys.exit(main(sys.argv[1:]))"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code, "show", "hand", *arguments],

@@ -33,34 +33,6 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
     return moved
 
 
-def separated(table: PairTable, before: QueryResult, after: QueryResult, contact: int, overlap: float) -> bool:
-    """Whether the plane between two pieces before the motion, fixed to either, still separates them after it."""
-    if contact < 0:
-        return False
-    first, second = before.contacts.pair[contact]
-    normal = before.contacts.normal[contact]
-    for carrier, other, direction, point in (
-        (first, second, normal, before.contacts.point_a[contact]),
-        (second, first, -normal, before.contacts.point_b[contact]),
-    ):
-        swept = table.swept[other]
-        if not len(swept.points):
-            continue
-        local_normal = before.placements[carrier, :3] @ direction
-        local_point = before.placements[carrier, :3] @ (point - before.placements[carrier, 3])
-        heights = []
-        for placed in (before.placements, after.placements):
-            world = swept.points @ placed[other, :3] + placed[other, 3]
-            local = (world - placed[carrier, 3]) @ placed[carrier, :3].T
-            heights.append(float(((local - local_point) @ local_normal).min()) - swept.radius)
-        turned = after.placements[[carrier, other], :3] - before.placements[[carrier, other], :3]
-        angle = float(np.sqrt(0.5 * np.einsum("ijk,ijk->i", turned, turned)).sum())
-        arc = 0.125 * angle**2 * (swept.reach + float(np.linalg.norm(before.placements[other, 3] - point)))
-        if min(heights) - arc > -overlap:
-            return True
-    return False
-
-
 def _apart(placed: QueryResult, count: int) -> Array:
     """Signed distance (pairs,) of every pair, not less than zero; those that were not measured at their least."""
     apart: Array = np.maximum(distances(placed, count), 0.0)

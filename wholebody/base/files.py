@@ -155,26 +155,14 @@ def check_file(path: str | PathLike[str], kind: str) -> None:
         pass
 
 
-def is_file(path: str | PathLike[str]) -> bool:
-    """Whether there is a regular file; false, and no error, for a path that no file system accepts."""
-    try:
-        return stat.S_ISREG(os.stat(path).st_mode)
-    except (OSError, ValueError):
-        return False
+is_file, is_folder = os.path.isfile, os.path.isdir
+"""False, and no error, for a path that no file system accepts."""
 
 
 def title_of(path: str | PathLike[str]) -> str:
     """The name of a file without folder and ending as a title: a line of text, whatever the locale can decode."""
     plain = os.fsencode(Path(path).stem).decode("utf-8", "backslashreplace")
     return one_line(plain, checks.LONGEST) if plain.strip() else repr(plain)
-
-
-def is_folder(path: str | PathLike[str]) -> bool:
-    """Whether there is a folder; false, and no error, for a path that no file system accepts."""
-    try:
-        return stat.S_ISDIR(os.stat(path).st_mode)
-    except (OSError, ValueError):
-        return False
 
 
 @contextmanager

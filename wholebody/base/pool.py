@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from threading import Lock
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from wholebody.base.errors import InputError
 
@@ -19,40 +20,22 @@ class Pool(Generic[T]):
         self._make, self._at_most = make, at_most
         self._free: list[T] = []
 
-    def borrow(self, begin: Callable[[T], Any] | None = None) -> Loan[T]:
-        """Borrow an object while a context lasts, which `begin` is called with before."""
-        return Loan(self, begin)
-
-    def take(self) -> T:
-        """A free object, or a new one."""
+    @contextmanager
+    def borrow(self, begin: Callable[[T], Any] | None = None) -> Iterator[T]:
+        """Borrow an object, new if none is free, which `begin` is called with; after an exception it is discarded."""
         try:
-            return self._free.pop()  # this and append are atomic
+            item = self._free.pop()  # this and append are atomic
         except IndexError:
-            return self._make()
-
-    def give(self, item: T) -> None:
-        """Take an object back."""
+            item = self._make()
+        if begin is not None:
+            begin(item)
+        yield item
         if self._at_most is None or len(self._free) < self._at_most:
             self._free.append(item)
 
 
-class Loan(Generic[T]):
-    """A context in which an object of a pool is borrowed; after an exception in it the object is discarded."""
-
-    def __init__(self, pool: Pool[T], begin: Callable[[T], Any] | None) -> None:
-        self._pool, self._begin = pool, begin
-
-    def __enter__(self) -> T:
-        """Borrow the object."""
-        self._item = self._pool.take()
-        if self._begin is not None:
-            self._begin(self._item)
-        return self._item
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Return the object."""
-        if kind is None:
-            self._pool.give(self._item)
+Loan: TypeAlias = AbstractContextManager[T]
+"""A context in which an object of a pool is borrowed."""
 
 
 class OneAtATime:

@@ -20,7 +20,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from os import _exit
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -86,7 +85,7 @@ class Outcome(NamedTuple):
 class Started(NamedTuple):
     """A process that reads jobs, the connection over which it gets them and answers, and what it writes."""
 
-    process: subprocess.Popen[bytes] | BaseProcess
+    process: subprocess.Popen[bytes]
     connection: Connection
     output: IO[bytes]
 
@@ -96,7 +95,7 @@ class Child:
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
         self._environment = dict(environment or {})
-        self._process: subprocess.Popen[bytes] | BaseProcess | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._output: IO[bytes] | None = None
         self._connection: Connection | None = None
         self._job: Job | None = None
@@ -160,7 +159,7 @@ class Child:
         """Kill the process."""
         if self._process is not None:
             self._process.kill()
-            _wait_for(self._process)
+            self._process.wait()
         for stream in (self._connection, self._output):
             if stream is not None:
                 stream.close()
@@ -169,7 +168,7 @@ class Child:
     def _ended(self) -> EndedError:
         assert self._process is not None
         assert self._output is not None
-        code = _wait_for(self._process)
+        code = self._process.wait()
         self._output.seek(0)
         lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
         # most characters kept of the last line that a process wrote
@@ -285,13 +284,6 @@ def serve(descriptor: int, parent: int) -> None:
             _parent.send((True, answer))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return
-
-
-def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:
-    if isinstance(process, subprocess.Popen):
-        return process.wait()
-    process.join()
-    return process.exitcode or 0
 
 
 def _memory(process: int | None) -> float:

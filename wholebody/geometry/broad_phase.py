@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.pair_distances import SinglePairs
 from wholebody.geometry.proximity import Contacts, PairTable
 
@@ -55,8 +55,8 @@ def near_among(
     kept = groups[:, 0] != groups[:, 1]
     for one, other in left_out:
         kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
-    kept[kept] = _may_be_near(table, placements, pieces[pairs[kept]], within)
     chosen = pieces[pairs[kept]]
+    chosen = chosen[~np.isinf(table.reach[chosen]).all(axis=1)]
     found = SinglePairs(table.geometry).measured(placements, chosen)
     # coal has no normal where two centres meet: any parts them as well
     found[~(np.linalg.norm(found[:, 1:4], axis=1) > 0.5), 1:4] = (0.0, 0.0, 1.0)
@@ -65,22 +65,3 @@ def near_among(
     number = np.full(len(near), -1, dtype=np.intp)
     distance, normal, point_a, point_b = (np.ascontiguousarray(part) for part in np.split(found, (1, 4, 7), axis=1))
     return Contacts(chosen, distance[:, 0], normal, point_a, point_b, number, placements).nearest_first()
-
-
-def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
-    """Whether the pieces of pairs (k, 2) can be near, along the axes of both of their boxes, or a plane's normal."""
-    axes, half = placements[pairs, :3], table.half[pairs]
-    apart = placements[pairs[:, 1], 3] - placements[pairs[:, 0], 3]
-    turned = np.abs(np.einsum("kij,klj->kil", axes[:, 0], axes[:, 1]))
-    gap = np.abs(np.einsum("ksij,kj->ksi", axes, apart)) - half
-    gap[:, 0] -= np.einsum("kil,kl->ki", turned, half[:, 1])
-    gap[:, 1] -= np.einsum("kil,ki->kl", turned, half[:, 0])
-    endless = np.isinf(table.reach[pairs])
-    kept = (gap < within).all(axis=(1, 2)) & ~endless.all(axis=1)
-    for plane in np.unique(pairs[endless]).tolist():
-        rows = np.flatnonzero((pairs == plane).any(axis=1) & kept)
-        other = np.where(pairs[rows, 0] == plane, pairs[rows, 1], pairs[rows, 0])
-        normal = table.swept[plane].faces[0, :3] @ placements[plane, :3]
-        height = (placements[other, 3] - placements[plane, 3]) @ normal - table.swept[plane].faces[0, 3]
-        kept[rows] = height - (np.abs(placements[other, :3] @ normal) * table.half[other]).sum(axis=1) < within
-    return np.asarray(kept)

@@ -239,29 +239,23 @@ def _continues(
 
 def _wound_alike(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """The faces, each turned so that neighbours go along their common edge in opposite directions."""
-    order: dict[tuple[int, int], list[int]] = {}
+    beside: dict[tuple[int, ...], list[int]] = {}
     for number, face in enumerate(faces.tolist()):
-        for k in range(3):
-            first, second = face[k], face[(k + 1) % 3]
-            order.setdefault((min(first, second), max(first, second)), []).append(number)
+        for edge in zip(face, face[1:] + face[:1], strict=True):
+            beside.setdefault(tuple(sorted(edge)), []).append(number)
     turned: NDArray[np.int64] = faces.copy()
-    seen = np.zeros(len(faces), dtype=bool)
-    for start in range(len(faces)):
-        if seen[start]:
-            continue
-        seen[start], queue = True, [start]
+    left = set(range(len(faces)))
+    while left:
+        queue = [min(left)]
+        left.remove(queue[0])
         while queue:
-            number = queue.pop()
-            face = turned[number].tolist()
-            for k in range(3):
-                first, second = face[k], face[(k + 1) % 3]
-                for other in order[min(first, second), max(first, second)]:
-                    if seen[other]:
-                        continue
-                    seen[other] = True
+            face = turned[queue.pop()].tolist()
+            for edge in zip(face, face[1:] + face[:1], strict=True):
+                for other in left.intersection(beside[tuple(sorted(edge))]):
                     there = turned[other].tolist()
-                    if any(there[j] == first and there[(j + 1) % 3] == second for j in range(3)):
+                    if edge in zip(there, there[1:] + there[:1], strict=True):
                         turned[other] = turned[other][::-1]
+                    left.remove(other)
                     queue.append(other)
     return turned
 

@@ -24,9 +24,9 @@ from wholebody.geometry.components import (
     passes_through_itself,
     split_components,
 )
-from wholebody.geometry.hull import hull_piece, thickened
+from wholebody.geometry.hull import check_points, hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
-from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.geometry.pieces import SMALLEST, Piece
 
 if TYPE_CHECKING:
     from wholebody.base.runner import Child
@@ -98,23 +98,16 @@ def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> Conv
 
 def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array, NDArray[np.int64]]:
     """The arrays of a mesh, (n, 3) float and (m, 3) int64; an InputError if they are none, or not finite."""
+    cloud = np.ascontiguousarray(check_points(vertices, what, "vertex", "vertices"))
     try:
-        cloud = np.ascontiguousarray(vertices, dtype=float)
         triangles = np.asarray(faces)
         whole = triangles.astype(np.int64)
     except (TypeError, ValueError):
-        raise InputError(f"{what}: vertices and faces are not arrays of numbers; give (n, 3) and (m, 3)") from None
-    if cloud.ndim != 2 or cloud.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
-        raise InputError(
-            f"{what}: vertices and faces have shapes {cloud.shape} and {triangles.shape}; give (n, 3) and (m, 3)"
-        )
+        raise InputError(f"{what}: the faces are not numbers; give an array of shape (m, 3)") from None
+    if triangles.ndim != 2 or triangles.shape[1:] != (3,):
+        raise InputError(f"{what}: the faces have shape {triangles.shape}; give an array of shape (m, 3)")
     if not len(triangles) or not len(cloud):
         raise InputError(f"{what}: it has no triangles")
-    bad = np.flatnonzero(~np.isfinite(cloud).all(axis=1))
-    if len(bad):
-        raise InputError(f"{what}: vertex {bad[0]} is {cloud[bad[0]].tolist()}; give finite numbers")
-    if np.abs(cloud).max() > LARGEST:
-        raise InputError(f"{what}: a vertex lies {np.abs(cloud).max():.4g} m from the origin; is the scale right?")
     if (whole != triangles).any() or whole.min() < 0 or whole.max() >= len(cloud):
         raise InputError(f"{what}: face indices must be whole numbers from 0 to {len(cloud) - 1}")
     return cloud, np.ascontiguousarray(whole)

@@ -40,7 +40,7 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
         InputError: not (n, 3), not finite, fewer than four different points, or thinner than `SMALLEST` in some
             direction (flat and collinear points too).
     """
-    cloud = _finite_points(points, what)
+    cloud = check_points(points, what)
     if len(cloud) < FEW:
         cloud = np.unique(cloud, axis=0)
     hull = _solid_hull(cloud, what)
@@ -77,24 +77,21 @@ def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
     return coal.Convex(vertices, triangles)
 
 
-def check_points(points: ArrayLike) -> Array:
-    """Points as a float array (n, 3) without duplicates; an InputError if they are none, or farther than `LARGEST`."""
-    return np.unique(_finite_points(points, "Hull"), axis=0)
-
-
-def _finite_points(points: ArrayLike, what: str) -> Array:
+def check_points(points: ArrayLike, what: str, one: str = "point", many: str = "points") -> Array:
+    """Points as a float array (n, 3); an InputError if they are none, or farther than `LARGEST`."""
     try:
         cloud = np.asarray(points, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"{what}: the points are not numbers; give an array of shape (n, 3)") from None
+        raise InputError(f"{what}: the {many} are not numbers; give an array of shape (n, 3)") from None
     if cloud.ndim != 2 or cloud.shape[1:] != (3,):
-        raise InputError(f"{what}: the points have shape {cloud.shape}; give an array of shape (n, 3)")
+        raise InputError(f"{what}: the {many} have shape {cloud.shape}; give an array of shape (n, 3)")
     bad = np.flatnonzero(~np.isfinite(cloud).all(axis=1))
     if len(bad):
-        raise InputError(f"{what}: point {bad[0]} is {cloud[bad[0]].tolist()}; give finite numbers")
-    if len(cloud) and np.abs(cloud).max() > LARGEST:
+        raise InputError(f"{what}: {one} {bad[0]} is {cloud[bad[0]].tolist()}; give finite numbers")
+    far = np.abs(cloud).max(initial=0.0)
+    if far > LARGEST:
         raise InputError(
-            f"{what}: a point lies {np.abs(cloud).max():.4g} m from the origin; give metres, at most {LARGEST:g}"
+            f"{what}: a {one} lies {far:.4g} m from the origin; give metres, at most {LARGEST:g}; is the scale right?"
         )
     return cloud
 

@@ -262,7 +262,7 @@ class Hull(Shape):
     points: Array
 
     def __post_init__(self) -> None:
-        points = check_points(array(self.points, "Hull: points", "an array of shape (n, 3)"))
+        points = np.unique(check_points(array(self.points, "Hull: points", "an array of shape (n, 3)"), "Hull"), axis=0)
         hull_piece(points, "Hull")
         points.setflags(write=False)
         object.__setattr__(self, "points", points)

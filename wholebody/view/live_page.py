@@ -90,15 +90,11 @@ class LivePage:
         # the process
         ending.join(timeout=1.0)
 
-    def wait(self) -> None:
-        """Wait until the page is stopped, or Ctrl-C."""
-        while not self._stopped.wait(0.2):
-            pass
-
     def serve(self) -> None:
         """Wait until the page is stopped or Ctrl-C, then end it."""
         try:
-            self.wait()
+            while not self._stopped.wait(0.2):
+                pass
         except KeyboardInterrupt:
             pass
         finally:

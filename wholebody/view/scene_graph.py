@@ -10,10 +10,10 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.placement import quaternions
+from wholebody.motion.thing_tracks import steady
 from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
-from wholebody.view.sender import Sender
-from wholebody.view.server import Command, Store
+from wholebody.view.server import Command, Server, Store
 from wholebody.view.style import LOOK, Color
 
 MANY = 1000  # opaque pieces of things in the world, from which on those of one form are drawn together
@@ -52,20 +52,20 @@ class SceneGraph:
 
     def __init__(self) -> None:
         self.store = Store()
-        self._sender: Sender | None = None
+        self._server: Server | None = None
         self._waiting: list[Command] = []
         self._markers: dict[str, Marker] = {}
         self._crowds: dict[str, Instances] = {}
 
-    def connect(self, sender: Sender) -> None:
+    def connect(self, server: Server) -> None:
         """Connect to the live page, which then shows everything."""
-        self._sender = sender
+        self._server = server
         self._waiting.clear()
-        sender.send(self.store.commands())
+        server.send(self.store.commands())
 
     def disconnect(self) -> None:
         """Disconnect from the live page; the content is kept."""
-        self._sender = None
+        self._server = None
         self._waiting.clear()
 
     def put(self, path: str, three: Mapping[str, Any]) -> None:
@@ -87,8 +87,8 @@ class SceneGraph:
 
     def flush(self) -> None:
         """Send all changes since the last call together."""
-        if self._sender is not None and self._waiting:
-            self._sender.send(self._waiting)
+        if self._server is not None and self._waiting:
+            self._server.send(self._waiting)
         self._waiting.clear()
 
     def show(self, keyframe: Keyframe) -> None:
@@ -132,7 +132,7 @@ class SceneGraph:
         if self.store.has(command):
             return
         self.store.apply(command)
-        if self._sender is not None:
+        if self._server is not None:
             self._waiting.append(command)
 
     def _provide(self, path: str, marker: Marker) -> None:
@@ -189,23 +189,14 @@ def _motion(path: str, matrices: Array, *, steps: bool = False) -> list[Track]:
     if (np.ptp(matrices, axis=0) < 1e-9).all():
         return []
     scales = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    turns = steady(quaternions(matrices[:, :3, :3] / scales[:, None, :]))
     tracks = [
         Track(path, "position", "vector3", matrices[:, :3, 3], steps),
-        Track(
-            path, "quaternion", "quaternion", continuous_quaternions(matrices[:, :3, :3] / scales[:, None, :]), steps
-        ),
+        Track(path, "quaternion", "quaternion", turns, steps),
     ]
     if (np.ptp(scales, axis=0) > 1e-9).any():
         tracks.append(Track(path, "scale", "vector3", scales, steps))
     return tracks
-
-
-def continuous_quaternions(rotations: Array) -> Array:
-    """Unit quaternions (n, 4) of rotations (n, 3, 3), neighbours on the same half of the sphere."""
-    q = quaternions(rotations)
-    flips = np.sign(np.einsum("ni,ni->n", q[1:], q[:-1]))
-    q[1:] *= np.cumprod(np.where(flips == 0, 1.0, flips))[:, None]
-    return q
 
 
 class Instances(NamedTuple):

@@ -1,51 +1,45 @@
-"""The process that serves the page and sends every drawing command to the browser tabs that show it.
+"""The live page: a thread serves it, and sends every drawing command to the browser tabs that show it.
 
-It runs apart from the program that draws, so that a long computation never freezes the page. It is started as a script
-and imports the standard library and tornado alone. It reads commands from its standard input, so no other process can
-send any, and writes messages to its standard output, one JSON object a line. It listens on one address, 127.0.0.1 by
-default, and ends when its input ends or its parent has ended.
+It listens on one address, 127.0.0.1 by default, and takes commands from this process alone.
 """
 
 from __future__ import annotations
 
-import json
-import os
+import atexit
+import importlib.util
+import math
 import re
+import socket
 import struct
-import sys
-from os import _exit
-from typing import TYPE_CHECKING, Any, NamedTuple
+import threading
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from typing import Any, NamedTuple
 
-if TYPE_CHECKING:
-    import asyncio
+from wholebody.base import checks
+from wholebody.base.errors import InputError, MissingPackageError
 
-HEADER = struct.Struct("<cHHI")
 LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 class Op:
-    """Kinds of commands: to the page, and PUSH, SYNC and PAGE to the server; STOP is a key of an ANIMATION."""
+    """Kinds of commands; STOP is a key of an ANIMATION."""
 
     OBJECT, TRANSFORM, PROPERTY, DELETE, CAMERA, ANIMATION = b"o", b"t", b"p", b"d", b"c", b"a"
-    PUSH, SYNC, PAGE = b"e", b"s", b"h"
     STOP = "stop"
 
 
 class Command(NamedTuple):
-    """One message: its kind, node and key, and the bytes for the page (msgpack).
+    """One message to the page: its kind, node and key, and its bytes (msgpack).
 
-    An ANIMATION with the key STOP is sent to open pages and not stored; PUSH, SYNC and PAGE are commands to the server.
+    An ANIMATION with the key STOP is sent to open pages and not stored.
     """
 
     op: bytes
     path: str = ""
     key: str = ""
     payload: bytes = b""
-
-    def pack(self) -> bytes:
-        """Return the serialised message: a header with the lengths, then the parts."""
-        path, key = self.path.encode(), self.key.encode()
-        return HEADER.pack(self.op, len(path), len(key), len(self.payload)) + path + key + self.payload
 
 
 class _Node:
@@ -149,58 +143,6 @@ class Queue:
         return taken
 
 
-def tell(**what: Any) -> None:
-    """Write one line to the parent."""
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
-
-
-class Hub:
-    """The picture, the page and the open tabs."""
-
-    def __init__(self) -> None:
-        self.store = Store()
-        self.page = ""
-        self.tabs: set[Any] = set()
-        self.syncs: list[int] = []
-
-    async def listen(self, reader: asyncio.StreamReader) -> None:
-        """Read commands until the input ends."""
-        import asyncio
-
-        while True:
-            try:
-                op, path, key, size = HEADER.unpack(await reader.readexactly(HEADER.size))
-                node = (await reader.readexactly(path)).decode()
-                name = (await reader.readexactly(key)).decode()
-                self.take(Command(op, node, name, await reader.readexactly(size)))
-            except asyncio.IncompleteReadError:
-                return
-
-    def take(self, command: Command) -> None:
-        """Carry out one command."""
-        if command.op == Op.PAGE:
-            self.page = command.payload.decode()
-            tell(ready=True)
-        elif command.op == Op.SYNC:
-            self.syncs.append(int(command.key))
-            self.settle()
-        elif command.op == Op.PUSH:
-            for tab in self.tabs:
-                tab.send_waiting()
-        else:
-            self.store.apply(command)
-            for tab in self.tabs:
-                tab.queue.put(command)
-
-    def settle(self) -> None:
-        """Answer the pending Op.SYNC commands if every tab has drawn everything."""
-        if self.syncs and all(tab.idle for tab in self.tabs):
-            for number in self.syncs:
-                tell(sync=number, tabs=len(self.tabs))
-            self.syncs.clear()
-
-
 class Guard:
     """Which requests a server of ours answers: those that call this machine by its name, from our own pages.
 
@@ -209,8 +151,6 @@ class Guard:
     """
 
     def __init__(self, host: str) -> None:
-        import socket
-
         names = {*LOCAL, host.lower()}
         if host not in LOCAL:
             names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
@@ -239,93 +179,173 @@ def is_address(name: str) -> bool:
     return True
 
 
-def make_application(hub: Hub, host: str) -> Any:
-    """The web side: the page at /, its socket at /socket, nothing else."""
-    from tornado.web import Application, HTTPError, RequestHandler
-    from tornado.websocket import WebSocketHandler
-
-    guard = Guard(host)
-
-    class Guarded(RequestHandler):  # type: ignore[misc]
-        """Refuses requests that are not of our own pages."""
-
-        def prepare(self) -> None:
-            headers = self.request.headers
-            if not guard.accepts(headers.get("Host"), headers.get("Origin")):
-                raise HTTPError(403)
-
-    class Page(Guarded):
-        def get(self) -> None:
-            self.set_header("Cache-Control", "no-store")
-            self.write(hub.page)
-
-    class Tab(Guarded, WebSocketHandler):  # type: ignore[misc]
-        """One open page. It acknowledges each message, and gets the next only then."""
-
-        def open(self, *args: str, **kwargs: str) -> None:
-            self.set_nodelay(True)
-            self.queue = Queue()
-            self.queue.waiting = [command.payload for command in hub.store.commands()]
-            hub.tabs.add(self)
-            tell(tabs=len(hub.tabs))
-            self.send()  # also an empty message: it tells the page that it is up to date
-
-        def send(self) -> None:
-            self.idle = False
-            self.write_message(bundle(self.queue.take()), binary=True)
-
-        def send_waiting(self) -> None:
-            if self.idle and self.queue.waiting:
-                self.send()
-
-        def on_message(self, message: str | bytes) -> None:
-            self.idle = True
-            self.send_waiting()
-            hub.settle()
-
-        def on_close(self) -> None:
-            hub.tabs.discard(self)
-            tell(tabs=len(hub.tabs))
-            hub.settle()
-
-    return Application([("/", Page), ("/socket", Tab)])
+def seconds(timeout: object) -> float:
+    """Seconds to wait, which may be infinite; raises InputError where they are negative or no number."""
+    if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
+        return threading.TIMEOUT_MAX
+    return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
 
 
-async def serve(parent: int, host: str, port: int) -> None:
-    """Serve until the input ends or the parent has ended; port 0 takes the first free one."""
-    import asyncio
-    import logging
-
-    from tornado.httpserver import HTTPServer
+def _bound(host: str, port: int) -> Any:
+    """Sockets that listen at a name or address of this machine; an InputError if it cannot be."""
     from tornado.netutil import bind_sockets
 
-    logging.getLogger("tornado").setLevel(logging.CRITICAL)
-    hub = Hub()
     candidates = [port] if port else [*range(7000, 7100), 0]
     for candidate in candidates:
         try:
-            sockets = bind_sockets(candidate, host)
-            break
+            return bind_sockets(candidate, host)
         except (OSError, UnicodeError) as error:
-            if candidate == candidates[-1]:
-                tell(refused=getattr(error, "strerror", None) or str(error))
-                return
-    server = HTTPServer(make_application(hub, host))
-    server.add_sockets(sockets)
-    shown = LOCAL[0] if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host  # everywhere
-    tell(url=f"http://{shown}:{sockets[0].getsockname()[1]}/")
-
-    reader = asyncio.StreamReader(limit=2**20)
-    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin.buffer)
-    listening = asyncio.ensure_future(hub.listen(reader))
-    while not listening.done() and os.getppid() == parent:
-        await asyncio.wait([listening], timeout=0.5)  # s: poll of the parent
+            why = getattr(error, "strerror", None) or str(error)
+    raise InputError(f"the page cannot be served at {host}, port {port or 'any'} ({why}); give another")
 
 
-if __name__ == "__main__":
-    from asyncio import run
-    from contextlib import suppress
+class Server:
+    """The thread that serves a page, its picture and the open tabs; only the thread touches them."""
 
-    with suppress(KeyboardInterrupt, BrokenPipeError):
-        run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
-    _exit(0)
+    def __init__(self, page: str, host: str = "127.0.0.1", port: int = 0) -> None:
+        """Serve the HTML of a page at a name or address of this machine; port 0 is the first free one from 7000."""
+        if importlib.util.find_spec("tornado") is None:
+            raise MissingPackageError("showing a scene live needs the package tornado; run: pip install tornado")
+        self.page, self.store, self.tabs = page, Store(), set[Any]()
+        self._asked: list[threading.Event] = []  # by those who wait until the tabs have drawn everything
+        self._changed = threading.Condition()  # notified when a tab opens or closes
+        sockets = _bound(host, port)
+        shown = LOCAL[0] if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host  # everywhere
+        self.url = f"http://{shown}:{sockets[0].getsockname()[1]}/"
+        import asyncio
+
+        self._loop = asyncio.new_event_loop()
+        self._stopped = asyncio.Event()
+        serving = self._serve(sockets, host)
+        self._thread = threading.Thread(
+            target=self._loop.run_until_complete, args=(serving,), name="wholebody page", daemon=True
+        )
+        self._thread.start()
+        atexit.register(self.close)
+
+    def send(self, commands: Iterable[Command]) -> None:
+        """Send commands; open tabs carry them out together."""
+        self._loop.call_soon_threadsafe(self._take, list(commands))
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until a tab shows the page; False if none did within `timeout` seconds."""
+        return self._until(lambda: bool(self.tabs), timeout)
+
+    def wait_until_closed(self, timeout: float, grace: float = 2.0) -> bool:
+        """Wait until no tab has shown the page for `grace` seconds; False if one still did after `timeout` seconds."""
+        end = time.monotonic() + timeout
+        while self._until(lambda: not self.tabs, end - time.monotonic()):
+            if not self.wait(min(grace, end - time.monotonic())):
+                return True
+        return False
+
+    def sync(self, timeout: float) -> bool:
+        """Wait until every open tab has carried out all commands; False if not within `timeout` seconds."""
+        done = threading.Event()
+        self._loop.call_soon_threadsafe(self.settle, done)
+        return done.wait(timeout)
+
+    def close(self) -> None:
+        """End the thread. Calling it again does nothing."""
+        atexit.unregister(self.close)
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._stopped.set)
+            self._thread.join()
+            self._loop.close()
+
+    def _until(self, true: Callable[[], bool], timeout: float) -> bool:
+        with self._changed:
+            return self._changed.wait_for(true, max(timeout, 0.0))
+
+    # ---- in the thread
+
+    async def _serve(self, sockets: Any, host: str) -> None:
+        import asyncio
+
+        from tornado.httpserver import HTTPServer
+
+        server = HTTPServer(self._application(host))
+        server.add_sockets(sockets)
+        await self._stopped.wait()
+        for one in sockets:
+            with suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)  # a forked process may hold it too
+        server.stop()
+        for tab in [*self.tabs]:
+            tab.close()
+        end = time.monotonic() + 1.0  # s: for which tabs are waited for
+        while self.tabs and time.monotonic() < end:
+            await asyncio.sleep(0.01)
+        await server.close_all_connections()
+
+    def _take(self, commands: Iterable[Command]) -> None:
+        for command in commands:
+            self.store.apply(command)
+            for tab in self.tabs:
+                tab.queue.put(command)
+        for tab in self.tabs:
+            tab.send_waiting()
+
+    def settle(self, *asked: threading.Event) -> None:
+        """Answer those who wait, and who ask now, if every tab has drawn everything."""
+        self._asked += asked
+        if all(tab.idle for tab in self.tabs):
+            for done in self._asked:
+                done.set()
+            self._asked.clear()
+
+    def changed(self) -> None:
+        """Tell those who wait for tabs, one of which has opened or closed."""
+        with self._changed:
+            self._changed.notify_all()
+
+    def _application(self, host: str) -> Any:
+        """The web side: the page at /, its socket at /socket, nothing else."""
+        from tornado.web import Application, HTTPError, RequestHandler
+        from tornado.websocket import WebSocketHandler
+
+        guard, hub = Guard(host), self
+
+        class Guarded(RequestHandler):  # type: ignore[misc]
+            """Refuses requests that are not of our own pages."""
+
+            def prepare(self) -> None:
+                headers = self.request.headers
+                if not guard.accepts(headers.get("Host"), headers.get("Origin")):
+                    raise HTTPError(403)
+
+        class Page(Guarded):
+            def get(self) -> None:
+                self.set_header("Cache-Control", "no-store")
+                self.write(hub.page)
+
+        class Tab(Guarded, WebSocketHandler):  # type: ignore[misc]
+            """One open page. It acknowledges each message, and gets the next only then."""
+
+            def open(self, *args: str, **kwargs: str) -> None:
+                self.set_nodelay(True)
+                self.queue = Queue()
+                self.queue.waiting = [command.payload for command in hub.store.commands()]
+                hub.tabs.add(self)
+                hub.changed()
+                self.send()  # also an empty message: it tells the page that it is up to date
+
+            def send(self) -> None:
+                self.idle = False
+                self.write_message(bundle(self.queue.take()), binary=True)
+
+            def send_waiting(self) -> None:
+                if self.idle and self.queue.waiting:
+                    self.send()
+
+            def on_message(self, message: str | bytes) -> None:
+                self.idle = True
+                self.send_waiting()
+                hub.settle()
+
+            def on_close(self) -> None:
+                hub.tabs.discard(self)
+                hub.changed()
+                hub.settle()
+
+        return Application([("/", Page), ("/socket", Tab)])

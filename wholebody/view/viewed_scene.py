@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -37,7 +37,7 @@ class ViewedAssembly:
     A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
     """
 
-    figure = None
+    figure: Any = None
     revision = 0
 
     def __init__(self, assembly: Assembly) -> None:
@@ -82,37 +82,6 @@ def checked_scene(scene: Any) -> Any:
     raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {correction}")
 
 
-class ViewedScene(Protocol):
-    """A figure among things, such as a `wholebody.Scene`."""
-
-    @property
-    def figure(self) -> Any:
-        """The figure; only goals use its frames."""
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model of the figure."""
-
-    @property
-    def geometry(self) -> Any:
-        """Pinocchio's geometry model with all pieces."""
-
-    @property
-    def objects(self) -> Mapping[str, Any]:
-        """Things by name; each may have a `color`, red, green, blue, alpha."""
-
-    @property
-    def piece_owner(self) -> Sequence[str]:
-        """Segment or object of each piece."""
-
-    @property
-    def revision(self) -> int:
-        """A number that changes when things are added or removed."""
-
-    def contacts(self, q: Array, within: float = ...) -> Any:
-        """Pairs nearer than `within` metres at the posture q, nearest first, as `Contacts` has them."""
-
-
 class ViewedWorld:
     """A figure, the things that stay, and things that move, which have joints here.
 
@@ -134,3 +103,7 @@ class ViewedWorld:
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Pairs nearer than `within` metres in a configuration (nq,), nearest first."""
         return self._workspace.near(np.asarray(q, dtype=float), within).nearest_first()
+
+
+ViewedScene: TypeAlias = Scene | ViewedAssembly | ViewedWorld
+"""What the viewer shows."""

@@ -27,8 +27,7 @@ from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots, check_movie, counted, frame_times, movie
-from wholebody.view.sender import Sender, seconds
-from wholebody.view.server import Command, Op
+from wholebody.view.server import Command, Op, Server, seconds
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
@@ -97,7 +96,7 @@ class Viewer:
         self._graph = SceneGraph()
         self._composition = Composition(viewed, self._graph, contact_distance, tuple(see_through), names)
         self._screenshots, self._shares = screenshots or Screenshots(), screenshots is not None
-        self._sender: Sender | None = None
+        self._server: Server | None = None
         self._camera: Command | None = None
         self._seen: list[Array] = []
         self._ghosts: list[Array] = []
@@ -268,7 +267,6 @@ class Viewer:
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
-            ViewerClosedError: the server could not be started; `open`, `sync` and those that wait raise it too.
         """
         return self._live().url
 
@@ -364,9 +362,9 @@ class Viewer:
     def close(self) -> None:
         """End the live page's server and the headless browser. Calling it again does nothing."""
         self._graph.disconnect()
-        if self._sender is not None:
-            self._sender.close()
-        self._sender = None
+        if self._server is not None:
+            self._server.close()
+        self._server = None
         if not self._shares:
             self._screenshots.close()
 
@@ -376,11 +374,11 @@ class Viewer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _live(self) -> Sender:
-        if self._sender is None:
-            self._sender = Sender(live_page(self.title), self._host, self._port)
-            self._graph.connect(self._sender)
-        return self._sender
+    def _live(self) -> Server:
+        if self._server is None:
+            self._server = Server(live_page(self.title), self._host, self._port)
+            self._graph.connect(self._server)
+        return self._server
 
     def _camera_command(self) -> Command:
         """The chosen camera, otherwise one that looks at the figure in its last postures."""

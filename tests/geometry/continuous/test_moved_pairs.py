@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from tests.reference import moved_pairs as reference
-from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved, kept_apart, separated
+from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved, kept_apart
 
 WITHIN = 0.05
 
@@ -46,23 +46,6 @@ def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
         found += len(mine)
     assert found > 20
     assert len(compiled_kernel().far_moved.signatures) == kinds  # nothing was compiled in the middle
-
-
-def test_compiled_loops_part_the_pairs_that_array_code_parts(scene):
-    table, both = scene.pair_table, np.zeros(2, dtype=int)
-    kinds = len(compiled_kernel().separated.signatures)
-    for q0, q1 in ways(scene, np.random.default_rng(4), 40):
-        before, after = placed(scene, q0), placed(scene, q1)
-        asked = np.arange(len(table.pairs), dtype=np.intp)
-        place = np.full(len(asked), -1)
-        place[before.contacts.number] = np.arange(len(before.contacts.number))
-        for overlap in (5e-4, -5e-3):
-            mine = separated(table, before, after, asked, overlap)
-            theirs = [reference.separated(table, before, after, int(contact), overlap) for contact in place]
-            assert np.array_equal(mine, theirs)
-            both += np.bincount(mine[before.contacts.number], minlength=2)
-    assert (both > 100).all()
-    assert len(compiled_kernel().separated.signatures) == kinds
 
 
 def test_a_pair_that_is_left_out_had_more_room_than_its_points_moved(scene):

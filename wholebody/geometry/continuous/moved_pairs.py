@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts, PairTable
@@ -39,16 +39,6 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
     return found
 
 
-def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: Indices, overlap: float) -> Mask:
-    """Which pairs (k,) the plane between their pieces before a motion, fixed to either, still separates after it."""
-    # The sagittas of the points' arcs are included; a pair that was not near before counts as not separated.
-    known = before.contacts
-    near = known.number, known.pair, known.normal, known.point_a, known.point_b
-    outline = table.points, table.first_point, table.radius, table.reach
-    found: Mask = compiled_kernel().separated(pairs, before.placements, after.placements, near, outline, overlap)
-    return found
-
-
 def kept_apart(table: PairTable, before: Array, after: Array, known: tuple[Array, Array, Array]) -> bool:
     """Whether all pairs keep their distances between two placements (n, 4, 3) of the pieces.
 
@@ -62,12 +52,8 @@ def kept_apart(table: PairTable, before: Array, after: Array, known: tuple[Array
 def compiled_kernel(moved_pairs_kernel: Any) -> None:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    placements, lines, one = np.zeros((0, 4, 3)), np.zeros((0, 3)), np.zeros(1, dtype=np.intp)
-    near = places, none, 0.0, places, none, 0.0
+    placements, near = np.zeros((0, 4, 3)), (places, none, 0.0, places, none, 0.0)
     moved_pairs_kernel.far_moved(placements, placements, (pairs, none, none), near)
-    moved_pairs_kernel.separated(
-        places, placements, placements, (places, pairs, lines, lines, lines), (lines, one, none, none), 0.0
-    )
     moved_pairs_kernel.kept_apart(placements, placements, (pairs, none), (none, none, none))
 
 

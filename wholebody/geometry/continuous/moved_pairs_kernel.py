@@ -1,12 +1,10 @@
-"""The pairs that moved by more than their distance, and planes between them, as compiled loops: see `moved_pairs`."""
+"""The pairs that moved by more than their distance, as compiled loops: see `moved_pairs`."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.geometry.pieces import ENDLESS
 
@@ -76,74 +74,6 @@ def kept_apart(before: Array, after: Array, table: tuple[Indices, Array], known:
             if _seen(before, after, a, b, reach[b]) > left and _seen(before, after, b, a, reach[a]) > left:
                 return False
     return True
-
-
-Outline: TypeAlias = tuple[Array, Indices, Array, Array]
-"""Of all n pieces: swept points (m, 3), one piece after the other, where those of each begin (n + 1,), the radius
-around them (n,), and the reach of the pieces from their origins (n,)."""
-
-
-@compiled()
-def separated(
-    doubtful: Indices, before: Array, after: Array, near: tuple[Indices, Indices, Array, Array, Array],
-    outline: Outline, overlap: float,
-) -> Mask:  # fmt: skip
-    """Whether a plane still separates pairs, (k,); `near`: their numbers, pieces, normals and nearest points."""
-    number, pair, normal, point_a, point_b = near
-    found = np.zeros(len(doubtful), dtype=np.bool_)
-    for k in range(len(doubtful)):
-        for c in range(len(number)):
-            if number[c] == doubtful[k]:
-                a, b, places = pair[c, 0], pair[c, 1], (before, after)
-                found[k] = _beyond(places, a, b, normal[c], 1.0, point_a[c], outline, overlap) or _beyond(
-                    places, b, a, normal[c], -1.0, point_b[c], outline, overlap
-                )
-                break
-    return found
-
-
-@compiled(inner=True)
-def _beyond(
-    places: tuple[Array, Array], carrier: int, other: int, normal: Array, sign: float, point: Array, outline: Outline,
-    overlap: float,
-) -> bool:  # fmt: skip
-    """Whether a piece stays beyond a plane that is fixed to another one, also on the arcs between both placements."""
-    before, after = places
-    all_points, first_point, radii, reach = outline
-    points, radius = all_points[first_point[other] : first_point[other + 1]], radii[other]
-    if len(points) == 0:
-        return False
-    local_normal, height, apart = np.empty(3), 0.0, 0.0
-    for j in range(3):
-        along, place = 0.0, 0.0
-        for i in range(3):
-            along += sign * before[carrier, j, i] * normal[i]
-            place += before[carrier, j, i] * (point[i] - before[carrier, 3, i])
-        local_normal[j] = along
-        height += along * place
-        apart += (before[other, 3, j] - point[j]) ** 2
-    least, angle = np.inf, 0.0
-    for placed in places:
-        world = np.zeros(3)  # the normal now
-        for i in range(3):
-            for j in range(3):
-                world[i] += placed[carrier, j, i] * local_normal[j]
-        for p in range(len(points)):
-            own = 0.0
-            for i in range(3):
-                at = placed[other, 3, i] - placed[carrier, 3, i]
-                for j in range(3):
-                    at += points[p, j] * placed[other, j, i]
-                own += world[i] * at
-            least = min(least, own - height - radius)
-    for piece in (carrier, other):
-        turned = 0.0
-        for j in range(3):
-            for i in range(3):
-                turned += (after[piece, j, i] - before[piece, j, i]) ** 2
-        angle += np.sqrt(0.5 * turned)
-    arc = 0.125 * angle * angle * (reach[other] + np.sqrt(apart))
-    return bool(least - arc > -overlap)
 
 
 @compiled(inner=True)

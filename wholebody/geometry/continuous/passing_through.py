@@ -1,9 +1,8 @@
 """Test whether a motion passes through something: proof for most pairs, a continuous sweep for the others.
 
 Two convex pieces that are d0 apart before a motion and d1 after it can only have changed sides if they moved against
-each other by d0 + d1 and the widths of both. If a motion is longer (a fast hand, a thin plate), the plane that
-separates them before it, fixed to one piece, may still separate them after it, up to the height of the arcs that points
-describe. The remaining pairs are swept.
+each other by d0 + d1 and the widths of both. If a motion is longer (a fast hand, a thin plate), it is halved a few
+times. The remaining pairs are swept.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved, separated
+from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved
 from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
@@ -48,9 +47,6 @@ class Queries(Protocol):
 
     def near(self, q: Array, within: float) -> Contacts:
         """Every pair nearer than `within` metres at a posture (nq,)."""
-
-    def placements(self, q: Array) -> Array:
-        """Placements of all pieces at a posture (nq,); see `Contacts.placements`."""
 
 
 def is_free(
@@ -119,13 +115,7 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
 def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
     """Whether some pair has changed sides during a motion from q0 to q1 (nq,); the state of `queries` is moved."""
     # Halving decides most pairs at a tenth of a sweep's cost. The distance shows a pair that touches at the end.
-    table = queries.table
-    moved = far_moved(table, before, after)
-    if not len(moved):
-        return False
-    moved = moved[~_passing_by(queries, before, after, q0, q1, moved)]
-    doubtful = _not_separated(table, before, after, moved)
-    # of a motion before doubtful pairs are swept
+    doubtful = far_moved(queries.table, before, after)
     return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, 3)
 
 
@@ -142,7 +132,7 @@ def _halved(
     if (inside & (end[doubtful] > -OVERLAP)).any():
         return True
     for first, last, start, stop in ((before, middle, q0, q), (middle, after, q, q1)):
-        still = np.intersect1d(doubtful_pairs(table, first, last), doubtful, assume_unique=True)
+        still = np.intersect1d(far_moved(table, first, last), doubtful, assume_unique=True)
         if len(still) and _halved(queries, first, last, start, stop, still, halvings - 1):
             return True
     return False
@@ -168,43 +158,3 @@ def first_passed(
     moved = far_moved(table, before, after)
     doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
     return queries.sweep.first_contact(q0, q1, doubtful, overlap) if len(doubtful) else None
-
-
-def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
-    """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
-    return _not_separated(table, before, after, far_moved(table, before, after))
-
-
-def _passing_by(
-    queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, pairs: Indices
-) -> NDArray[np.bool_]:
-    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle."""
-    # The centres' path is approximated by two chords, with twice the deviation of a parabola as a margin.
-    table = queries.table
-    halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
-    first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
-    start, middle, end = (
-        placements[first, 3] - placements[second, 3] for placements in (before.placements, halfway, after.placements)
-    )
-    bow = middle - 0.5 * (start + end)
-    room = np.minimum(_nearest(start, middle), _nearest(middle, end)) - 0.5 * np.sqrt(np.einsum("ij,ij->i", bow, bow))
-    apart: NDArray[np.bool_] = room > table.reach[first] + table.reach[second]
-    return apart
-
-
-def _nearest(start: Array, end: Array) -> Array:
-    """Least distance (k,) of the origin from the segments between points (k, 3)."""
-    along = end - start
-    share = -np.einsum("ij,ij->i", start, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
-    point = start + np.clip(share, 0.0, 1.0)[:, None] * along
-    nearest: Array = np.sqrt(np.einsum("ij,ij->i", point, point))
-    return nearest
-
-
-def _not_separated(table: PairTable, before: QueryResult, after: QueryResult, doubtful: Indices) -> Indices:
-    """The pairs that no plane separates before and after."""
-    if not len(doubtful):
-        return doubtful
-    # m: overlap that is allowed between two postures; half of the thinnest plate that counts
-    left: Indices = doubtful[~separated(table, before, after, doubtful, 5e-4)]
-    return left

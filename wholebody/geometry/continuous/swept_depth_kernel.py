@@ -127,11 +127,7 @@ def lower_bounds(
                 at0 = _above(carrier, other, normal, height, place0, outline)
                 at1 = _above(carrier, other, normal, height, place1, outline)
                 best = max(best, min(at0, at1) - sag - accuracy)
-            face, most = -1, -np.inf
-            for f in range(first_face[carrier], first_face[carrier + 1]):
-                along = faces[f, 0] * normal[0] + faces[f, 1] * normal[1] + faces[f, 2] * normal[2]
-                if along > most:
-                    face, most = f, along
+            face = _nearest_face(normal, faces, first_face[carrier], first_face[carrier + 1])
             if face >= 0 and radius[carrier] == 0.0:
                 for i in range(3):
                     normal[i] = faces[face, i]
@@ -178,11 +174,7 @@ def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) ->
             if reach[carrier] < np.inf:
                 height = _support(carrier, local[0], local[1], local[2], outline)
                 safe[k] = max(safe[k], _stays_above(other, carrier, normal, height, bend, level[k], sliding, shapes))
-            face, most = -1, -np.inf
-            for f in range(first_face[carrier], first_face[carrier + 1]):
-                along = faces[f, 0] * local[0] + faces[f, 1] * local[1] + faces[f, 2] * local[2]
-                if along > most:
-                    face, most = f, along
+            face = _nearest_face(local, faces, first_face[carrier], first_face[carrier + 1])
             if face >= 0:
                 height = faces[face, 3]
                 if reach[carrier] < np.inf:  # coplanar triangles of a hull are one face, to 1e-7
@@ -222,6 +214,17 @@ def _stays_above(
         elif rate < 0.0:
             least = min(least, room / -rate)
     return least
+
+
+@compiled(inner=True)
+def _nearest_face(direction: Array, faces: Array, begin: int, end: int) -> int:
+    """The face, of those from `begin` to `end`, whose normal is nearest to a direction (3,); -1 for none."""
+    face, most = -1, -np.inf
+    for f in range(begin, end):
+        along = faces[f, 0] * direction[0] + faces[f, 1] * direction[1] + faces[f, 2] * direction[2]
+        if along > most:
+            face, most = f, along
+    return face
 
 
 @compiled(inner=True)
