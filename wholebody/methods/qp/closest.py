@@ -23,8 +23,8 @@ from wholebody.figures.state import State, Wrench
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
 from wholebody.methods.qp.rows import Rows, StepSize
 from wholebody.methods.qp.settings import NEAREST, SEARCH
+from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import compiled_kernel
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at

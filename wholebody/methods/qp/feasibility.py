@@ -17,7 +17,7 @@ from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.rows import StepSize
 from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
-from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.methods.qp.solvers.base import WorkingSet
 
 SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
 AT_LIMIT = 1e-6  # rad

@@ -17,9 +17,9 @@ from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduc
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.rows import Multipliers, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
+from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7

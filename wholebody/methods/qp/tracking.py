@@ -18,10 +18,9 @@ from wholebody.methods.control import BUDGET, budget_for_sweep
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
-from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.base import QPSolver, WorkingSet
 from wholebody.methods.qp.step_program import FrameStep, QPStep, StepProgram
 from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
 from wholebody.solution import Solution
