@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 from wholebody.base.arrays import Array
-from wholebody.methods.base import TOLERANCE, SolvedStep, SolvingTracker, check_problem
+from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker, check_problem
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import LONGEST, Control, Progress
 from wholebody.problem import Problem
@@ -69,7 +69,7 @@ class DescentTracker(SolvingTracker, Generic[Kind]):
         self._exact = method
         self._rough: Kind = replace(rough, tolerance=max(method.tolerance, method.on_the_way))
 
-    def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
+    def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
         """The end of a search from the posture q (nq,); without a tolerance to that of frames on the way."""
         if tolerance is not None:
             TOLERANCE(tolerance, "tolerance")
@@ -79,7 +79,7 @@ class DescentTracker(SolvingTracker, Generic[Kind]):
         self.workspace.refresh()
         with Control(method.time_limit) as control:
             ending = self.search(method, problem, control)
-        return SolvedStep(self.bounded(q, ending.q), ending.iterations, 0.0)
+        return FrameStep(self.bounded(q, ending.q), ending.iterations)
 
     def search(self, method: Kind, problem: Problem, control: Control) -> Ending:
         """The end of the method's search; a tracker may keep what searches share."""

@@ -19,20 +19,10 @@ from wholebody.base.compiled import with_loops
 from wholebody.figures.state import free_roots, root_freedoms
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.settings import ESCAPE
-from wholebody.terms.linearisation import PackedLinearisation
 
 DIRECTIONS = (
-    (1, 0, 0),
-    (-1, 0, 0),
-    (0, 1, 0),
-    (0, -1, 0),
-    (0, 0, 1),
-    (0, 0, -1),
-    (1, 1, 0),
-    (1, -1, 0),
-    (-1, 1, 0),
-    (-1, -1, 0),
-)
+    (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0),
+)  # fmt: skip
 
 
 class ProjectionRows(NamedTuple):
@@ -42,15 +32,6 @@ class ProjectionRows(NamedTuple):
     rows: Array  # (k, nv) rates of what must not become negative
     room: Array  # (k,) how much that is, metres and radians
     box: Array  # (2, nv) displacements that bounds allow
-
-
-def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> ProjectionRows:
-    """Rows of a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
-    gaps = at.gap - np.minimum(at.clearance, ESCAPE.gap)
-    return ProjectionRows(
-        -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
-        np.concatenate([gaps, room]), at.box,
-    )  # fmt: skip
 
 
 def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], ProjectionRows]) -> Array | None:

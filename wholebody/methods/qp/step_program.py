@@ -277,12 +277,3 @@ class QPStep(NamedTuple):
 
     def __repr__(self) -> str:
         return brief(self)
-
-
-class FrameStep(NamedTuple):
-    """Answer of one frame."""
-
-    q: Array  # (nq,) the next posture
-    iterations: int  # programs
-    collisions: tuple[Collision, ...] = ()  # see `QPStep`
-    path: tuple[tuple[float, Array], ...] = ()
