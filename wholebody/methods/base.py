@@ -223,7 +223,7 @@ class SolvingTracker(NotCopyable):
 
     def solve(self, q: Array) -> Solution:
         """The method's answer for the present goals, from the start q (nq,)."""
-        return self._method.solve(self._begun(q))
+        return self._method.solve(self.problem.with_start(q))
 
     def nearest(self, q: Array) -> Solution:
         """The same with measures relative to q."""
