@@ -14,7 +14,7 @@ import wholebody as wb
 from wholebody.bench.measure.track import judge, track
 from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.figures.state import State
-from wholebody.methods.qp.rows import StepSize
+from wholebody.methods.qp.quadratic_program import StepSize
 from wholebody.methods.qp.settings import PROGRAM, STEP
 from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.solvers.registry import make_solver

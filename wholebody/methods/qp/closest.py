@@ -21,7 +21,7 @@ import numpy as np
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
-from wholebody.methods.qp.rows import Rows, StepSize
+from wholebody.methods.qp.quadratic_program import Rows, StepSize
 from wholebody.methods.qp.settings import NEAREST, SEARCH
 from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import compiled_kernel

@@ -14,8 +14,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
-from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.rows import StepSize
+from wholebody.methods.qp.quadratic_program import QuadraticProgram, StepSize
 from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
 from wholebody.methods.qp.solvers.base import WorkingSet
 

@@ -14,8 +14,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import Multipliers, StepSize
+from wholebody.methods.qp.quadratic_program import Multipliers, QPSolution, QuadraticProgram, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of

@@ -14,8 +14,16 @@ from wholebody.base.arrays import Array, brief, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.state import State
 from wholebody.methods.qp.active_set import semismooth_kernel
-from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
-from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
+from wholebody.methods.qp.quadratic_program import (
+    NUMBERS,
+    QuadraticProgram,
+    Rows,
+    StepParts,
+    StepRoom,
+    StepSize,
+    Terms,
+    work_size,
+)
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WorkingSet
 from wholebody.methods.qp.subproblem import Subproblem

@@ -15,8 +15,16 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import LinearRows, Multipliers, Rows, StepSize, Terms, Violation
+from wholebody.methods.qp.quadratic_program import (
+    LinearRows,
+    Multipliers,
+    QPSolution,
+    QuadraticProgram,
+    Rows,
+    StepSize,
+    Terms,
+    Violation,
+)
 from wholebody.methods.qp.settings import PROGRAM, WEIGHTS
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Linearisation, TermPlanes

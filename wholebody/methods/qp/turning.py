@@ -13,7 +13,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import with_loops
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.methods.qp.rows import Bodies, Rows, Seen
+from wholebody.methods.qp.quadratic_program import Bodies, Rows, Seen
 from wholebody.methods.qp.settings import TRACKING
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import PackedLinearisation

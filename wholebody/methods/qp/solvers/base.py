@@ -84,6 +84,7 @@ class WorkingSet:
     def __init__(self, solver: QPSolver) -> None:
         self.solver, self._kernel = solver, compiled_kernel()
         self._room: Room | None = None
+        self.held: Mask | None = None
         self.reset()
 
     def solve(self, program: QuadraticProgram, key: Indices) -> QPSolution:
@@ -99,7 +100,7 @@ class WorkingSet:
 
     def reset(self) -> None:
         """Drop the guess."""
-        self.held: Mask | None = None
+        self.held = None
         self.pushing = np.zeros(0, dtype=np.intp)
 
     def _corrected(self, program: QuadraticProgram, key: Indices) -> QPSolution | None:
