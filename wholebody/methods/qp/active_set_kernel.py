@@ -17,14 +17,9 @@ WHOLE = 1e-9  # a step this near to the whole way is the whole way but for round
 
 @compiled(error_model="numpy", forceinline=True)
 def grow(
-    program: QuadraticProgram,
-    key: Indices,
-    known: Indices,
-    active: ActiveSet,
-    limits: Corrections,
-    room: Room,
+    program: QuadraticProgram, key: Indices, known: Indices, active: ActiveSet, limits: Corrections, room: Room,
     x: Array,
-) -> int:
+) -> int:  # fmt: skip
     """Solve a program from the active set of the one before, with the elastic rows that matter; see `WorkingSet`.
 
     `key` (k,) names its elastic rows, `known` those that pushed before, ascending; `active` has the bounds of then and

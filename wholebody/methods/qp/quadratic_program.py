@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.methods.qp.settings import PROGRAM
 
 NUMBERS = 29  # of `step_program.numbers_of`
@@ -53,6 +53,12 @@ class QuadraticProgram(NamedTuple):
     def packed(self) -> QuadraticProgram:
         """The program in arrays without gaps, as compiled loops take it."""
         return self if all(part.flags.c_contiguous for part in self) else type(self)(*map(np.ascontiguousarray, self))
+
+    def with_squares(self, rows: Array, weight: Array) -> QuadraticProgram:
+        """The program with squares of more rows (k, n), with weights (k,), in its objective."""
+        target = np.concatenate([self.target, np.zeros(len(rows))])
+        rows, weight = np.vstack([self.rows, rows]), np.concatenate([self.weight, weight])
+        return with_values(self, rows=rows, target=target, weight=weight)
 
     @property
     def is_computable(self) -> bool:

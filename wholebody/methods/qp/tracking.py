@@ -324,14 +324,8 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
     """One step of several that follow each other along a path."""
     displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
     return with_values(
-        steps[-1],
-        q=path[-1][1],
-        displacement=displacement,
-        velocity=displacement / dt,
-        exact=all(step.exact for step in steps),
-        note=next((step.note for step in steps if step.note), ""),
-        iterations=sum(step.iterations for step in steps),
+        steps[-1], q=path[-1][1], displacement=displacement, velocity=displacement / dt, path=tuple(path),
+        exact=all(step.exact for step in steps), note=next((step.note for step in steps if step.note), ""),
+        iterations=sum(step.iterations for step in steps), share=min(step.share for step in steps),
         programs=dict(sum((Counter(step.programs) for step in steps), Counter[str]())),
-        share=min(step.share for step in steps),
-        path=tuple(path),
-    )
+    )  # fmt: skip

@@ -152,13 +152,10 @@ def scaled_split(program: QuadraticProgram) -> SplitForm:
     matrix = np.zeros((size, program.size + size))
     matrix[:, : program.size] = np.vstack([program.rows, program.elastic]) * (root / scale)[:, None]
     matrix[:, program.size :] = np.diag(np.where(np.arange(size) < soft, -root, root) / np.sqrt(weight))
-    return SplitForm(
-        np.concatenate([program.diagonal / scale**2, np.ones(size)]),
-        np.concatenate([program.linear / scale, np.zeros(size)]),
-        matrix,
-        root * np.concatenate([program.target, program.least]),
-        scale * np.array([program.lower, program.upper]),
-    )
+    diagonal = np.concatenate([program.diagonal / scale**2, np.ones(size)])
+    linear = np.concatenate([program.linear / scale, np.zeros(size)])
+    least = root * np.concatenate([program.target, program.least])
+    return SplitForm(diagonal, linear, matrix, least, scale * np.array([program.lower, program.upper]))
 
 
 def read_active(box: Array, push: Array) -> ActiveSet:

@@ -117,14 +117,10 @@ class Workspace:
         """Put the program's numbers in."""
         n, m, self.k = self.n, self.m, len(program.least)
         spare = self.slots - self.k
-        form = scaled_split(
-            with_values(
-                program,
-                elastic=np.vstack([program.elastic, np.zeros((spare, n))]),
-                least=np.append(program.least, np.full(spare, SCALING.inactive)),
-                elastic_weight=np.append(program.elastic_weight, np.ones(spare)),
-            )
-        )
+        elastic = np.vstack([program.elastic, np.zeros((spare, n))])
+        least = np.append(program.least, np.full(spare, SCALING.inactive))
+        weight = np.append(program.elastic_weight, np.ones(spare))
+        form = scaled_split(with_values(program, elastic=elastic, least=least, elastic_weight=weight))
         self.hessian, self.gradient = form.diagonal, form.linear
         self.values = np.vstack([np.eye(n, len(form.linear)), form.matrix]).T[self._entries]
         self.low = np.concatenate([form.box[0], form.least])
