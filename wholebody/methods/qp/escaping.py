@@ -1,9 +1,8 @@
 """A free posture for the end of a frame in which a thing came faster than the figure can move.
 
-What is thin and fast is often past the figure at the end of the frame, or the figure may be beside it. So postures
-within what bounds allow are sought with the thing where it ends: from the posture before, from where its root may go,
-and from random ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937), again and again.
-A program would leave all of them violated where not all can be parted to first order, and hardly move.
+Postures within what bounds allow are sought with the thing where it ends: from the posture before, from where its root
+may go, and from random ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937). A program
+would leave all of them violated where not all can be parted to first order.
 """
 
 from __future__ import annotations

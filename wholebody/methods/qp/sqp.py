@@ -1,9 +1,7 @@
 """Sequential quadratic programming from one start to a local solution.
 
-Each iteration linearises, solves one quadratic program, and judges its step by the violation and the measures, with a
-funnel (Gould and Toint 2010): far from the goals a step must reduce the violation; near, it must reduce the Lagrangian
-and stay inside the funnel, which narrows where a descent leaves the best feasible posture and ends at an infeasible
-one. No penalty weight has to be guessed. Steps that could have jumped over something are swept.
+Each iteration linearises, solves one quadratic program, and judges its step with a funnel (Gould and Toint 2010): far
+from the goals it must reduce the violation; near, the Lagrangian, inside the funnel. docs/theory/qp.md has the rest.
 """
 
 from __future__ import annotations

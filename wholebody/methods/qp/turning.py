@@ -1,7 +1,7 @@
 """Which steps turn some pair nearer than its rows predict: those are looked at where they end, and others are not.
 
-Rows are straight and bodies turn. How much nearer a pair gets by that is bounded for each pair by itself, from what the
-joints between the root and its two pieces do; an arm that is far from everything costs nothing, however it turns.
+How much nearer a pair gets than its straight rows say is bounded for each pair by itself, from what the joints between
+the root and its two pieces do.
 """
 
 from __future__ import annotations
@@ -34,12 +34,7 @@ class Turning:
         seen = Seen(TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen)
         self._lengths = np.array(seen)
         place: Indices = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
-        self.joints: tuple[Indices, Indices, Indices, Indices] = (
-            place,
-            state.column_joint,
-            state.parents,
-            np.asarray(table.joint),
-        )
+        self.joints = place, state.column_joint, state.parents, np.asarray(table.joint)
         self._twists = np.empty((3, workspace.model.njoints, 6))
 
     def bodies(self, placements: Array) -> Bodies:
