@@ -167,10 +167,11 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         return {}
     from wholebody.methods import starts
     from wholebody.methods.acceleration import Anderson
-    from wholebody.methods.qp import closest, feasibility, multistart, sqp, working_set
+    from wholebody.methods.qp import closest, feasibility, multistart, sqp
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp.feasibility import Feasibility
-    from wholebody.methods.qp.working_set import WorkingSet
+    from wholebody.methods.qp.solvers import base
+    from wholebody.methods.qp.solvers.base import WorkingSet
     from wholebody.terms import linearisation
 
     search, descent, corrected = multistart.Multistart, sqp.SQP, WorkingSet._corrected
@@ -200,11 +201,11 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
         "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
         "multipliers": (sqp, "DESCENT", with_values(sqp.DESCENT, near_met=0.0)),
-        "working sets that grow": (working_set, "CORRECTIONS", with_values(working_set.CORRECTIONS, near=-1e9)),
+        "working sets that grow": (base, "CORRECTIONS", with_values(base.CORRECTIONS, near=-1e9)),
         "sets corrected in one entry": (
-            working_set,
+            base,
             "CORRECTIONS",
-            with_values(working_set.CORRECTIONS, at_once=10**6),
+            with_values(base.CORRECTIONS, at_once=10**6),
         ),
         "end of probes that stall": (feasibility, "stalls", lambda history, tolerance: False),
         "rule of Boender and Rinnooy Kan": (starts, "all_found", lambda *given: False),

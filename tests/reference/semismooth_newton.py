@@ -6,8 +6,8 @@ import numpy as np
 
 from tests.reference.active_set import minimise_on_face
 from wholebody.base.arrays import Array, Mask
+from wholebody.methods.qp.active_set_kernel import STILL, WHOLE
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
-from wholebody.methods.qp.semismooth_kernel import STILL, WHOLE
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:

@@ -169,14 +169,15 @@ def named_terms(problem: Problem) -> list[tuple[str, object]]:
     ]
 
 
-class SolvedStep(NamedTuple):
-    """A step that was a whole solve."""
+class FrameStep(NamedTuple):
+    """Answer of one frame."""
 
     q: Array  # (nq,) the next posture
     iterations: int  # of the method
-    judging: float  # seconds of wall time that the assessment took
-    # what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of.
+    # what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of; empty if nothing
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()  # where the figure went if things moved, see `QPStep`
+    judging: float = 0.0  # seconds of wall time that an assessment took
 
 
 class SolvingTracker(NotCopyable):
@@ -218,11 +219,11 @@ class SolvingTracker(NotCopyable):
         if tolerance is not None:
             tolerance = TOLERANCE(tolerance, "tolerance")
         solution = self._method.solve(self._begun(q))
-        return SolvedStep(self.bounded(q, solution.q), solution.iterations, solution.assessment.seconds)
+        return FrameStep(self.bounded(q, solution.q), solution.iterations, judging=solution.assessment.seconds)
 
     def solve(self, q: Array) -> Solution:
         """The method's answer for the present goals, from the start q (nq,)."""
-        return self._method.solve(self._begun(q))
+        return self._method.solve(self.problem.with_start(q))
 
     def nearest(self, q: Array) -> Solution:
         """The same with measures relative to q."""

@@ -12,7 +12,7 @@ from wholebody.assessment.posture import Assessment, judged
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
-from wholebody.methods.control import Control
+from wholebody.methods.control import Control, errors_left
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status, TraceEntry
 from wholebody.tasks.balance import Balance
@@ -41,9 +41,7 @@ class Ending(NamedTuple):
 
 def assessed_tolerance(tolerance: float) -> float:
     """Error [m, rad] up to which an assessment counts as good for a method with a tolerance."""
-    # factor on the tolerance: an assessment computes with other rounding
-    # m
-    return 1.05 * tolerance + 1e-6
+    return 1.05 * tolerance + 1e-6  # an assessment computes with other rounding
 
 
 def meets(judgement: Assessment, tolerance: float) -> bool:
@@ -72,16 +70,10 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
     blocked = "" if status == "solved" else judgement.in_the_way
     after = (blocked, _way_out(problem, judgement), ending.remark, _undefined(status, control), note)
     return Solution(
-        q=ending.q,
-        status=status,
-        seconds=control.seconds,
-        iterations=ending.iterations,
-        assessment=judgement,
-        trace=ending.trace,
-        method=ending.method or method,
-        message=said + "".join(after),
+        q=ending.q, status=status, seconds=control.seconds, iterations=ending.iterations, assessment=judgement,
+        trace=ending.trace, method=ending.method or method, message=said + "".join(after),
         programs=dict(ending.programs),
-    )
+    )  # fmt: skip
 
 
 def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool) -> Status:
@@ -96,7 +88,7 @@ def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool)
 def _message(problem: Problem, status: Status, judgement: Assessment, ending: Ending, enough: float) -> str:
     if status == "solved":
         return f"solved {ending.how}"
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
+    left = errors_left(judgement)
     if ending.failure:
         return f"{ending.failure}: {left}"
     if status == "unreachable":
@@ -132,11 +124,9 @@ def _way_out(problem: Problem, judgement: Assessment) -> str:
 
 def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float]:
     """The most violated constraint, and its violation."""
-    worst = max(
-        ("the clearance of a pair", max(judgement.clearance_violation, judgement.penetration)),
-        ("a joint limit", judgement.limit_violation),
-        key=lambda item: item[1],
-    )
+    clearance = max(judgement.clearance_violation, judgement.penetration)
+    parts = ("the clearance of a pair", clearance), ("a joint limit", judgement.limit_violation)
+    worst = max(parts, key=lambda item: item[1])
     state = State(problem.scene.model).update(q)
     for name, term in zip(problem.constraint_names, problem.constraints, strict=True):
         value = np.atleast_1d(term.value(state))

@@ -136,10 +136,9 @@ class Control:
         """Why the solve was ended, and the remaining errors; empty if it was not ended."""
         if not self.reason:
             return ""
-        left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
         broken = max(judgement.clearance_violation, judgement.constraint_violation, judgement.limit_violation)
         also = f", and constraints are violated by {broken:.3g} m or rad" if broken > 1e-4 else ""
-        return f"{self.reason}: {left}{also}"
+        return f"{self.reason}: {errors_left(judgement)}{also}"
 
     def step_back(self, error: UndefinedTermError) -> None:
         """Note that a step was taken back: a term of one's own is not finite where it leads."""
@@ -178,6 +177,11 @@ class Control:
         if self.reason:
             signal.default_int_handler(number, frame)
         self.reason = "Ctrl-C ended it"
+
+
+def errors_left(judgement: Assessment) -> str:
+    """What is left of the goals' errors, in words."""
+    return f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
 
 
 @contextmanager

@@ -25,15 +25,8 @@ from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
-from wholebody.methods.base import (
-    DAMPING,
-    Iterations,
-    TimeLimit,
-    Tolerance,
-    UnsupportedTermError,
-    check_problem,
-    refusal,
-)
+from wholebody.methods import base
+from wholebody.methods.base import Iterations, TimeLimit, Tolerance, UnsupportedTermError
 from wholebody.methods.conclusion import Ending
 from wholebody.methods.control import Control
 from wholebody.methods.descents import Descends
@@ -75,7 +68,7 @@ class DampedLeastSquares(Checked, Descends):
 
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 300
-    damping: Annotated[float, DAMPING] = 1e-3
+    damping: Annotated[float, base.DAMPING] = 1e-3
     time_limit: TimeLimit = None
 
     @property
@@ -85,21 +78,16 @@ class DampedLeastSquares(Checked, Descends):
 
     def accepts(self, problem: Problem) -> str | None:
         """None if all constraints are equalities; otherwise the sentence that names the others."""
-        return refusal(self.name, _unsupported(check_problem(problem, "DampedLeastSquares.accepts: problem")))
+        return base.refusal(self.name, _unsupported(base.check_problem(problem, "DampedLeastSquares.accepts: problem")))
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`; contacts are ignored."""
         descent = _Descent(problem, self, workspace.state, control)
         converged = descent.run()
         return Ending(
-            descent.best,
-            converged,
-            descent.steps,
-            tuple(descent.trace),
-            f"in {descent.steps} steps",
-            unit="steps",
+            descent.best, converged, descent.steps, tuple(descent.trace), f"in {descent.steps} steps", unit="steps",
             caveat="contacts are not seen by this method",
-        )
+        )  # fmt: skip
 
 
 class _Descent:
@@ -109,8 +97,7 @@ class _Descent:
         refused = _unsupported(problem)
         if refused:
             raise UnsupportedTermError("dls", refused)
-        self._problem, self._method = problem, method
-        self._state, self._control = state, control
+        self._problem, self._method, self._state, self._control = problem, method, state, control
         self.best: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[TraceEntry] = []
         self.steps = 0
@@ -169,18 +156,13 @@ class _Descent:
         wanted = np.hstack([np.zeros(0), *(-root * error for root, error, _ in asked)])
         of_wanted = np.vstack([none, *(root * rows for root, _, rows in asked)])
         lower, upper = allowed(problem.bounds, problem.scene.figure.limits, state, None)
-        dq, free = np.zeros(state.model.nv), upper > lower
-        stopped = np.zeros(state.model.nv)
+        free, stopped = upper > lower, np.zeros(state.model.nv)
         while True:  # every round stops one more joint, so the loop ends
-            dq = _prioritised(
-                of_held[:, free],
-                held - of_held @ stopped,
-                of_wanted[:, free],
-                wanted - of_wanted @ stopped,
-                self._method,
-            )
-            full = np.array(stopped)
-            full[free] = dq
+            full: Array = stopped.copy()
+            full[free] = _prioritised(
+                of_held[:, free], held - of_held @ stopped, of_wanted[:, free], wanted - of_wanted @ stopped,
+                self._method.damping,
+            )  # fmt: skip
             over = free & ((full < lower) | (full > upper))
             if not over.any():
                 return full
@@ -188,17 +170,17 @@ class _Descent:
             free &= ~over
 
 
-def _prioritised(of_held: Array, held: Array, of_wanted: Array, wanted: Array, method: DampedLeastSquares) -> Array:
+def _prioritised(of_held: Array, held: Array, of_wanted: Array, wanted: Array, damping: float) -> Array:
     """Least motion (n,) that corrects the equalities, and then the goals in the null space of the equalities."""
     if not len(held):
-        return _damped(of_wanted, wanted, method.damping)
-    first = _damped(of_held, held, method.damping)
+        return _damped(of_wanted, wanted, damping)
+    first = _damped(of_held, held, damping)
     square = of_held @ of_held.T
     value, vector = np.linalg.eigh(square)
     kept = value > RANK * max(float(value.max(initial=0.0)), RANK)
     basis = (vector[:, kept] / np.sqrt(value[kept])).T @ of_held  # orthonormal rows that span those of the equalities
     within = of_wanted - (of_wanted @ basis.T) @ basis
-    second = _damped(within, wanted - of_wanted @ first, method.damping)
+    second = _damped(within, wanted - of_wanted @ first, damping)
     return np.asarray(first + second - basis.T @ (basis @ second))
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from wholebody.base.arrays import Array
-from wholebody.methods.base import TOLERANCE, SolvedStep, SolvingTracker, check_problem
+from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker, check_problem
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import LONGEST, Control, Progress
 from wholebody.problem import Problem
@@ -57,19 +57,14 @@ class Descends(ABC):
         return DescentTracker(self, problem, dt)
 
 
-Kind = TypeVar("Kind", bound=Descends)
-
-
-class DescentTracker(SolvingTracker, Generic[Kind]):
+class DescentTracker(SolvingTracker):
     """Follows by the searches of a method: a frame takes the end of a search, without an assessment or a message."""
 
-    def __init__(self, method: Kind, problem: Problem, dt: float) -> None:
-        super().__init__(method, problem, dt)  # type: ignore[arg-type] # a method also says what it accepts
-        rough: Any = method
-        self._exact = method
-        self._rough: Kind = replace(rough, tolerance=max(method.tolerance, method.on_the_way))
+    def __init__(self, method: Any, problem: Problem, dt: float) -> None:
+        super().__init__(method, problem, dt)
+        self._exact, self._rough = method, replace(method, tolerance=max(method.tolerance, method.on_the_way))
 
-    def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
+    def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
         """The end of a search from the posture q (nq,); without a tolerance to that of frames on the way."""
         if tolerance is not None:
             TOLERANCE(tolerance, "tolerance")
@@ -79,8 +74,9 @@ class DescentTracker(SolvingTracker, Generic[Kind]):
         self.workspace.refresh()
         with Control(method.time_limit) as control:
             ending = self.search(method, problem, control)
-        return SolvedStep(self.bounded(q, ending.q), ending.iterations, 0.0)
+        return FrameStep(self.bounded(q, ending.q), ending.iterations)
 
-    def search(self, method: Kind, problem: Problem, control: Control) -> Ending:
+    def search(self, method: Any, problem: Problem, control: Control) -> Ending:
         """The end of the method's search; a tracker may keep what searches share."""
-        return method._descend(problem, self.workspace, control)
+        found: Ending = method._descend(problem, self.workspace, control)
+        return found

@@ -32,19 +32,14 @@ def off_limits(problem: Problem, state: State, start: Array) -> Array | None:
 
 
 def restarts(
-    problem: Problem,
-    state: State,
-    start: Array,
-    rng: np.random.Generator,
-    count: int,
-    spreads: Sequence[float] = (),
-) -> Iterator[Array]:
+    problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int,
+    spreads: Sequence[float] = SPREADS,
+) -> Iterator[Array]:  # fmt: skip
     """Random postures (nq,) within limits and bounds, as far as `spreads`, shares of the ranges, say in turn."""
     lower, upper = _ranges(problem, start)
     span = upper - lower
-    shares = spreads or SPREADS
     for number in range(count):
-        spread = shares[number % len(shares)]
+        spread = spreads[number % len(spreads)]
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 

@@ -12,9 +12,9 @@ from scipy.optimize import lsq_linear
 from tests.reference.active_set import objective
 from wholebody.base.arrays import with_values
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.solvers.base import SCALING, scaled_split
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _structure
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
-from wholebody.methods.qp.solvers.split_form import SCALING, scaled_split
 
 TOLERANCE = 1e-6  # rad: bounded least squares of weights that differ by a factor of 1e6 are as exact as this
 

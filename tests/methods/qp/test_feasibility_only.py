@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.methods.qp.rows import StepSize
+from wholebody.methods.qp.quadratic_program import StepSize
 from wholebody.methods.qp.subproblem import Subproblem
 
 

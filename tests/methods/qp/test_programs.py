@@ -15,8 +15,8 @@ from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.face_kernel import Face, minimise_on_face
 from wholebody.methods.qp.quadratic_program import ActiveSet
 from wholebody.methods.qp.settings import CORRECTIONS
+from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
-from wholebody.methods.qp.working_set import WorkingSet
 
 
 def by_quadprog(program):

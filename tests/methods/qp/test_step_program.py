@@ -14,12 +14,12 @@ import wholebody as wb
 from wholebody.bench.measure.track import judge, track
 from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.figures.state import State
-from wholebody.methods.qp.rows import StepSize
+from wholebody.methods.qp.quadratic_program import StepSize
 from wholebody.methods.qp.settings import PROGRAM, STEP
+from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.terms.linearisation import Linearisation, PackedLinearisation
 
 DT = 0.01

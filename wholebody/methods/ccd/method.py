@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pinocchio as pin
@@ -121,7 +121,7 @@ class CCD(Checked, Descends):
         return CCDTracker(self, problem, dt)
 
 
-class CCDTracker(DescentTracker[CCD]):
+class CCDTracker(DescentTracker):
     """Follows by searches; it resolves overlap with things that were moved into the figure."""
 
     def __init__(self, method: CCD, problem: Problem, dt: float) -> None:
@@ -129,7 +129,7 @@ class CCDTracker(DescentTracker[CCD]):
         self._shared = _Shared(problem.scene, self.workspace)
         self.overlap_resolutions(problem.start)  # makes its chains, which would take as long as ten frames
 
-    def search(self, method: CCD, problem: Problem, control: Control) -> Ending:
+    def search(self, method: Any, problem: Problem, control: Control) -> Ending:
         """The end of a search."""
         return _Search(method, problem, self._shared, control).end()
 

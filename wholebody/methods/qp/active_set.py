@@ -88,11 +88,11 @@ def compiled_kernel(active_set_kernel: Any) -> None:
     active_set_kernel.minimise_with(program, active, CORRECTIONS.tolerance, room.work, x)
 
 
-@with_loops("wholebody.methods.qp.semismooth_kernel")
-def semismooth_kernel(kernel: Any) -> None:
+@with_loops("wholebody.methods.qp.active_set_kernel")
+def semismooth_kernel(active_set_kernel: Any) -> None:
     """The module of semismooth Newton steps, compiled or read back: few solves need it, a tracker cannot wait."""
     program, active = smallest()
-    kernel.minimise(program, 1, CORRECTIONS.tolerance, active, np.empty(work_size(1, 0, 0)), np.zeros(1))
+    active_set_kernel.minimise(program, 1, CORRECTIONS.tolerance, active, np.empty(work_size(1, 0, 0)), np.zeros(1))
 
 
 def smallest() -> tuple[QuadraticProgram, ActiveSet]:

@@ -1,11 +1,8 @@
 """Starts on the open side of the faces that surfaces are to meet, and the problem at the place of contacts found.
 
-A descent never passes through a thing. From a foot under the pedal that it is to press, or a back behind its backrest,
-none leads to the contact. The posture just before contact, which is found through everything, is on the right side of
-all faces at once, and a few programs lead from there to the contacts.
-
-A hand that is to close around a bar is found in the same way with the bar in front of its palm: from below a table or
-with the fingers on the bar's far end no descent leads around.
+A descent never passes through a thing: none leads from a foot under the pedal that it is to press to the contact. The
+posture just before contact, found through everything, is on the right side of all faces at once. A hand that is to
+close around a bar is found in the same way, with the bar in front of its palm.
 """
 
 from __future__ import annotations
@@ -67,8 +64,7 @@ def before_contact(
         else:
             missed.append(local)
             ends.append(local.violation.total)
-        # ends that are the least and equally far: the goals are out of reach, and others are no nearer
-        # times the least violation up to which ends count as equally far
+        # three ends that are the least and equally far: the goals are out of reach, and others are no nearer
         alike = sum(end <= 1.1 * min(ends) for end in ends) >= 3
         if alike or shared.control.over or len(shared.trace) >= most:
             break

@@ -1,9 +1,8 @@
 """A posture outside of things from one where contact normals cancel.
 
-Two pieces of one segment that overlap one thing from opposite sides push it in opposite directions. Their rows add up
-to nothing, and no descent leaves, although a translation does: the least that separates all pieces of the two
-(`wholebody.geometry.penetration`; figure 4b of Schmidl and Lin, "Real-time physically-based interaction between avatars
-and virtual environments"). Damped least squares over the joints realises it.
+Rows of two pieces of one segment that overlap one thing from opposite sides add up to nothing, and no descent leaves,
+although a translation does: the least that separates all pieces of the two (`wholebody.geometry.penetration`; figure 4b
+of Schmidl and Lin, "Real-time physically-based interaction between avatars and virtual environments").
 """
 
 from __future__ import annotations

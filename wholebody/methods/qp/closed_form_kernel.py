@@ -289,10 +289,7 @@ def sampled(
         How many there are.
     """
     (lower, upper), near, values = limits, nearest.copy(), np.zeros(len(found))
-    weighed = False
-    for weight in nearest[1]:
-        weighed = weighed or weight > 0.0
-    if not weighed:
+    if not (nearest[1] > 0.0).any():
         near[1] = 1.0
     if arm.held >= 0:
         joint = arm.joints[arm.held]
@@ -357,7 +354,7 @@ def along(
     that of the least effort. The effort; inf, with q as it was, where there is none.
     """
     joint, golden = arm.joints[arm.held], 0.5 * (np.sqrt(5.0) - 1.0)
-    low, high, best, end = q[joint] - spacing, q[joint] + spacing, np.inf, q.copy()
+    low, high = q[joint] - spacing, q[joint] + spacing
     at, effort, posture = np.empty(2), np.empty(2), np.empty((2, len(q)))
     at[0], at[1] = high - golden * (high - low), low + golden * (high - low)
     for side in range(2):
@@ -373,12 +370,10 @@ def along(
             copy(posture[1], posture[0])
             at[1] = low + golden * (high - low)
         effort[new] = beside(arm, goal, limits, nearest, at[new], q, posture[new])
-    for side in range(2):
-        if effort[side] < best:
-            best = effort[side]
-            copy(posture[side], end)
-    copy(end, q)
-    return best
+    side = 0 if effort[0] <= effort[1] else 1
+    if effort[side] < np.inf:
+        copy(posture[side], q)
+    return float(effort[side])
 
 
 @compiled(error_model="numpy")

@@ -21,10 +21,10 @@ import numpy as np
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
-from wholebody.methods.qp.rows import Rows, StepSize
+from wholebody.methods.qp.quadratic_program import Rows, StepSize
 from wholebody.methods.qp.settings import NEAREST, SEARCH
+from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import compiled_kernel
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
@@ -71,17 +71,12 @@ class Closest(Stage):
                 self.shared.lineariser.state.update(here.at.q)
                 bent = self._curvature(rows, push if here.violation.hold <= NEAREST.held else np.zeros_like(push))
             bend, weight = bent
-            lower, upper = program.lower.copy(), program.upper.copy()
             if not self.contacts:  # where nothing is in the way, and a translation bends nothing
-                lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
+                for own, most in ((program.lower, here.at.lower), (program.upper, here.at.upper)):
+                    own[self._walk] = most[self._walk]
             program = with_values(
-                program,
-                lower=lower,
-                upper=upper,
+                program.with_squares(bend, weight),
                 diagonal=np.maximum(program.diagonal, NEAREST.damping * float(weight.max(initial=0.0))),
-                rows=np.vstack([program.rows, bend]),
-                target=np.concatenate([program.target, np.zeros(len(bend))]),
-                weight=np.concatenate([program.weight, weight]),
             )
             x = working_set.solve(program, rows.key).x
             predicted = subproblem.violation(rows, x)

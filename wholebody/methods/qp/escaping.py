@@ -1,9 +1,8 @@
 """A free posture for the end of a frame in which a thing came faster than the figure can move.
 
-What is thin and fast is often past the figure at the end of the frame, or the figure may be beside it. So postures
-within what bounds allow are sought with the thing where it ends: from the posture before, from where its root may go,
-and from random ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937), again and again.
-A program would leave all of them violated where not all can be parted to first order, and hardly move.
+Postures within what bounds allow are sought with the thing where it ends: from the posture before, from where its root
+may go, and from random ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937). A program
+would leave all of them violated where not all can be parted to first order.
 """
 
 from __future__ import annotations
@@ -19,20 +18,10 @@ from wholebody.base.compiled import with_loops
 from wholebody.figures.state import free_roots, root_freedoms
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.settings import ESCAPE
-from wholebody.terms.linearisation import PackedLinearisation
 
 DIRECTIONS = (
-    (1, 0, 0),
-    (-1, 0, 0),
-    (0, 1, 0),
-    (0, -1, 0),
-    (0, 0, 1),
-    (0, 0, -1),
-    (1, 1, 0),
-    (1, -1, 0),
-    (-1, 1, 0),
-    (-1, -1, 0),
-)
+    (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0),
+)  # fmt: skip
 
 
 class ProjectionRows(NamedTuple):
@@ -42,15 +31,6 @@ class ProjectionRows(NamedTuple):
     rows: Array  # (k, nv) rates of what must not become negative
     room: Array  # (k,) how much that is, metres and radians
     box: Array  # (2, nv) displacements that bounds allow
-
-
-def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> ProjectionRows:
-    """Rows of a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
-    gaps = at.gap - np.minimum(at.clearance, ESCAPE.gap)
-    return ProjectionRows(
-        -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
-        np.concatenate([gaps, room]), at.box,
-    )  # fmt: skip
 
 
 def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], ProjectionRows]) -> Array | None:

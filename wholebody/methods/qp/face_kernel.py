@@ -35,17 +35,10 @@ def face(work: Array, n: int, m: int, k: int) -> Face:
     fourth = third + 3 * most
     last = fourth + k
     return Face(
-        work[:first].reshape((most, n)),
-        work[third:][:most],
-        work[third + most :][:most],
-        work[third + 2 * most :][:most],
-        work[last + n :][:n],
-        work[fourth:last],
-        work[first:second].reshape((most, n)),
-        work[second:third],
-        work[last:][:n],
-        work[last + 2 * n :][:n],
-    )
+        work[:first].reshape((most, n)), work[third:][:most], work[third + most :][:most],
+        work[third + 2 * most :][:most], work[last + n :][:n], work[fourth:last],
+        work[first:second].reshape((most, n)), work[second:third], work[last:][:n], work[last + 2 * n :][:n],
+    )  # fmt: skip
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)

@@ -1,8 +1,7 @@
 """Feasibility first: from a start to a feasible posture, by whole Gauss-Newton steps in a small box, without measures.
 
-The step slides along what is in the way with all of its length: the joints that are held up stay, and the others go
-on. A step that asks for a part of the errors and least motion, as `sqp` does, gets no nearer there. Where a joint is
-held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is put there.
+A step slides along what is in the way with all of its length; one that asks for a part of the errors and least motion,
+as in `sqp`, gets no nearer there. A joint that its limit stops is put to its other limit, where a turn leads there.
 """
 
 from __future__ import annotations
@@ -14,10 +13,9 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
-from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.rows import StepSize
+from wholebody.methods.qp.quadratic_program import QuadraticProgram, StepSize
 from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
-from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.methods.qp.solvers.base import WorkingSet
 
 SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
 AT_LIMIT = 1e-6  # rad
@@ -33,32 +31,24 @@ class Feasibility(Stage):
         """Go from a posture within limits, shape (nq,), to a feasible one; else to a stationary one."""
         working_set = WorkingSet(self.shared.solver)
         here, box, last = self.look(start), FEASIBILITY.step, np.zeros(self.figure.model.nv)
-        history: list[float] = []
-        count = 0
-        wrapped: set[int] = set()
+        count, history, wrapped = 0, list[float](), set[int]()
         while here.violation.worst > self.tolerance and count < self.iterations and not self.shared.control.over:
             history.append(here.violation.total)
             count += 1
             size = StepSize(box / PROGRAM.box, 0.0, FEASIBILITY.damping, False)
             program = self.shared.subproblem.program(here.at, here.rows, size)
             step = working_set.solve(program, here.rows.key).x
-            stuck = float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance)
-            if stuck:
+            if float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance):
                 way = self._turned_on(here, program, step, wrapped)
                 there = None if way is None else self.moved(here, way)
                 if there is None:
                     return self.ended(here, True, count)
-                here, history, box = there, [], FEASIBILITY.step
-                last = np.zeros_like(step)
+                here, history, box, last = there, [], FEASIBILITY.step, np.zeros_like(step)
                 working_set.reset()
                 self.record(here, "turned on")
                 continue
-            box = (
-                max(SHORTER * box, FEASIBILITY.least_step)
-                if float(step @ last) < 0.0
-                else min(LONGER * box, FEASIBILITY.step)
-            )
-            last = step
+            back, last = float(step @ last) < 0.0, step
+            box = max(SHORTER * box, FEASIBILITY.least_step) if back else min(LONGER * box, FEASIBILITY.step)
             there = self.moved(here, step)
             if there is None:
                 if box < FEASIBILITY.least_step:

@@ -14,7 +14,7 @@ from wholebody.base.errors import UndefinedTermError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
-from wholebody.methods.qp.rows import Multipliers, Rows, Violation
+from wholebody.methods.qp.quadratic_program import Multipliers, Rows, Violation
 from wholebody.methods.qp.settings import DESCENT, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem

@@ -159,7 +159,7 @@ class QP(Settings, Descends):
         Raises:
             InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        return QPTracker(problem, self._qp_solver(), dt, self, lambda: replace(self, measures=True))
+        return QPTracker(problem, self._qp_solver(), dt, self)
 
 
 def _measure(problem: Problem, workspace: Workspace, q: Array | None) -> float:

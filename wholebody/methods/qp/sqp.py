@@ -1,9 +1,7 @@
 """Sequential quadratic programming from one start to a local solution.
 
-Each iteration linearises, solves one quadratic program, and judges its step by the violation and the measures, with a
-funnel (Gould and Toint 2010): far from the goals a step must reduce the violation; near, it must reduce the Lagrangian
-and stay inside the funnel, which narrows where a descent leaves the best feasible posture and ends at an infeasible
-one. No penalty weight has to be guessed. Steps that could have jumped over something are swept.
+Each iteration linearises, solves one quadratic program, and judges its step with a funnel (Gould and Toint 2010): far
+from the goals it must reduce the violation; near, the Lagrangian, inside the funnel. docs/theory/qp.md has the rest.
 """
 
 from __future__ import annotations
@@ -14,12 +12,11 @@ import numpy as np
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import Multipliers, StepSize
+from wholebody.methods.qp.quadratic_program import Multipliers, QPSolution, QuadraticProgram, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
+from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7

@@ -14,14 +14,21 @@ from wholebody.base.arrays import Array, brief, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.state import State
 from wholebody.methods.qp.active_set import semismooth_kernel
-from wholebody.methods.qp.quadratic_program import QuadraticProgram, work_size
-from wholebody.methods.qp.rows import NUMBERS, Rows, StepParts, StepRoom, StepSize, Terms
+from wholebody.methods.qp.quadratic_program import (
+    NUMBERS,
+    QuadraticProgram,
+    Rows,
+    StepParts,
+    StepRoom,
+    StepSize,
+    Terms,
+    work_size,
+)
 from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
-from wholebody.methods.qp.solvers.base import ACTIVE_SET
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, WorkingSet
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.turning import Turning
 from wholebody.methods.qp.turning import compiled_kernel as compiled_turning
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import Workspace
@@ -278,12 +285,3 @@ class QPStep(NamedTuple):
 
     def __repr__(self) -> str:
         return brief(self)
-
-
-class FrameStep(NamedTuple):
-    """Answer of one frame."""
-
-    q: Array  # (nq,) the next posture
-    iterations: int  # programs
-    collisions: tuple[Collision, ...] = ()  # see `QPStep`
-    path: tuple[tuple[float, Array], ...] = ()

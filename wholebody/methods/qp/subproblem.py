@@ -15,8 +15,16 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.rows import LinearRows, Multipliers, Rows, StepSize, Terms, Violation
+from wholebody.methods.qp.quadratic_program import (
+    LinearRows,
+    Multipliers,
+    QPSolution,
+    QuadraticProgram,
+    Rows,
+    StepSize,
+    Terms,
+    Violation,
+)
 from wholebody.methods.qp.settings import PROGRAM, WEIGHTS
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Linearisation, TermPlanes
@@ -49,20 +57,17 @@ class Subproblem:
 
     def __init__(self, problem: Problem, state: State) -> None:
         """Read off which constraint rows are equalities; the state is moved to the problem's start."""
-        lower, upper, weight = [], [], []
         state.update(problem.start)
+        bounds: list[Array] = [np.zeros((2, 0))]
         for constraint in problem.constraints:
             low, high = np.atleast_1d(constraint.lower), np.atleast_1d(constraint.upper)
             size = max(len(low), len(high))
             if size == 1:  # one bound may be that of many rows
                 size = np.size(constraint.value(state))
-            lower.append(low if len(low) == size else np.full(size, low[0]))
-            upper.append(high if len(high) == size else np.full(size, high[0]))
-        for goal in problem.goals:
-            weight.append(np.full(np.atleast_1d(goal.error(state)).shape, goal.weight))
-        self._lower = np.concatenate(lower) if lower else np.zeros(0)
-        self._upper = np.concatenate(upper) if upper else np.zeros(0)
-        goal_weight = np.concatenate(weight) if weight else np.zeros(0)
+            bounds.append(np.array([np.broadcast_to(bound, size) for bound in (low, high)]))
+        lower, upper = bound = np.concatenate(bounds, axis=1)
+        weights = [np.full(np.size(goal.error(state)), goal.weight) for goal in problem.goals]
+        goal_weight = np.concatenate([np.zeros(0), *weights])
         share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), PROGRAM.least_share)
         self.scale = 1.0
         """What measures are multiplied by, so that heavy ones do not outweigh goals."""
@@ -71,15 +76,14 @@ class Subproblem:
             self.scale = PROGRAM.heaviest_curvature / float(heaviest.max())
         # what stands for the measures where they do not count, so that what is reached does not depend on them
         self._effort = 2.0 * problem.scene.figure.effort_weights
-        self._equal = np.flatnonzero(self._lower == self._upper)
-        self.equalities = [int((low == high).sum()) for low, high in zip(lower, upper, strict=True)]
+        self._equal = np.flatnonzero(lower == upper)
+        self.equalities = [int((low == high).sum()) for low, high in bounds[1:]]
         """How many rows of each constraint are equalities."""
-        low = (self._lower != self._upper) & np.isfinite(self._lower)
-        high = (self._lower != self._upper) & np.isfinite(self._upper)
-        self.one_sided = int(low.sum() + high.sum())
-        neither = (self._lower != self._upper) & ~low & ~high
-        kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
-        self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share, np.array(WEIGHTS))
+        has_low, has_high = (lower != upper) & np.isfinite(bound)
+        self.one_sided = int(has_low.sum() + has_high.sum())
+        neither = (lower != upper) & ~has_low & ~has_high
+        kind = np.where(neither, -1, has_low + 2 * has_high).astype(np.intp)
+        self.terms = Terms(kind, bound, share, np.array(WEIGHTS))
         self._numbers, self._kernel = np.array(PROGRAM), compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
@@ -148,12 +152,7 @@ class Subproblem:
         )  # fmt: skip
         if not len(squares):
             return program
-        return with_values(
-            program,
-            rows=np.vstack([rows.soft, squares]),
-            target=np.concatenate([target, np.zeros(len(squares))]),
-            weight=np.concatenate([rows.soft_weight, np.full(len(squares), self.scale / step.gain)]),
-        )
+        return program.with_squares(squares, np.full(len(squares), self.scale / step.gain))
 
 
 def multipliers_of(program: QuadraticProgram, answer: QPSolution, rows: Rows, scale: float) -> Multipliers:

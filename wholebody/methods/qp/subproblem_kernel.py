@@ -7,7 +7,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot, sort
-from wholebody.methods.qp.rows import LinearRows, Rows, StepSize, Terms
+from wholebody.methods.qp.quadratic_program import LinearRows, Rows, StepSize, Terms
 from wholebody.methods.qp.settings import ProgramNumbers, Weights
 
 MOST_ROWS = 4096  # more than one contact ever has

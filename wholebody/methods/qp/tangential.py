@@ -1,8 +1,7 @@
 """A step near the goals in a normal and a tangential part, and where the tangential ones lead: docs/theory/qp.md.
 
-The measures' curvature H does not know how the constraints are curved, so the tangential parts of one step after the
-other form a linear sequence, or grow where the measures curve downwards along the constraints. The normal parts follow
-the square of the step and have no law of their own; they would spoil an extrapolation.
+The measures' curvature H does not know how the constraints are curved, so the tangential parts of successive steps form
+a linear sequence, or grow where the measures curve downwards along the constraints. The normal parts have no such law.
 """
 
 from __future__ import annotations
@@ -36,10 +35,8 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, work: 
     target = program.target.copy()
     target[: len(shift)] += shift
     active, normal = answer.active, None
-    lower, upper = (
-        active.lower & (program.lower >= -DESCENT.room),
-        active.upper & (program.upper <= DESCENT.room),
-    )
+    lower = active.lower & (program.lower >= -DESCENT.room)
+    upper = active.upper & (program.upper <= DESCENT.room)
     left = (active.lower & ~lower) | (active.upper & ~upper)
     if left.any():
         normal = without_gradient(program, with_values(active, lower=lower, upper=upper), target, work)

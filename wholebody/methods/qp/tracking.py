@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,15 +15,14 @@ from wholebody.base.checks import flag, posture
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.methods.base import TOLERANCE, Method, SolvingTracker, begun, goal_error, nearest_to
+from wholebody.methods.base import TOLERANCE, FrameStep, Method, SolvingTracker, begun, goal_error, nearest_to
 from wholebody.methods.control import BUDGET, budget_for_sweep
-from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
+from wholebody.methods.qp.escaping import ProjectionRows, free_end
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
-from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.step_program import FrameStep, QPStep, StepProgram
+from wholebody.methods.qp.solvers.base import QPSolver, WorkingSet
+from wholebody.methods.qp.step_program import QPStep, StepProgram
 from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
-from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
 from wholebody.solution import Solution
@@ -46,23 +47,13 @@ class QPTracker(SolvingTracker):
     unswept = np.inf
     leaves_overlap = True
 
-    def __init__(
-        self, problem: Problem, solver: QPSolver, dt: float, method: Method, minimising: Callable[[], Method]
-    ) -> None:
-        """Set up for steps of `dt` seconds.
-
-        Args:
-            problem: whose goals are followed.
-            solver: of the programs.
-            dt: seconds a step.
-            method: for whole solves.
-            minimising: makes the same method that minimises the measures.
+    def __init__(self, problem: Problem, solver: QPSolver, dt: float, method: Method) -> None:
+        """Set up for steps of `dt` seconds, whose programs a solver gets, and whole solves by a method.
 
         Raises:
             InputError: dt is not a positive finite number.
         """
         super().__init__(method, problem, dt)
-        self._minimising = minimising
         solver.load()  # not in the middle of a drag
         compiled_escape()
         self._working_set, self._query_distance = WorkingSet(solver), TRACKING.least_within
@@ -131,13 +122,11 @@ class QPTracker(SolvingTracker):
                 return FrameStep(here, spent + 1)
         return FrameStep(last.q, most)
 
-    def solve(self, q: Array) -> Solution:
-        """The method's answer for the present goals, begun at the posture q (nq,)."""
-        return self._method.solve(self.problem.with_start(q))
-
     def nearest(self, q: Array) -> Solution:
         """The same with measures that count from q, and are minimised: they say what is near."""
-        return self._minimising().solve(nearest_to(self.problem, q))
+        settings: Any = self._method
+        minimising: Method = replace(settings, measures=True)
+        return minimising.solve(nearest_to(self.problem, q))
 
     def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
         """A step with things that move or are still in the figure: they advance by shares, and the figure yields."""
@@ -165,11 +154,10 @@ class QPTracker(SolvingTracker):
         if path[-1][0] < 1.0:
             path.append((1.0, path[-1][1]))
             workspace.place(motion.placements(1.0))
-        free = (
-            None if depth <= TRACKING.out or motion.still else free_end(model, q, TRACKING.out, self._projection_rows)
-        )
-        if free is not None and self._lineariser.undefined(free) is None:
-            path = [(0.0, q), (1.0, free)]
+        if depth > TRACKING.out and not motion.still:
+            free = free_end(model, q, TRACKING.out, self._projection_rows)
+            if free is not None and self._lineariser.undefined(free) is None:
+                path = [(0.0, q), (1.0, free)]
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
@@ -178,7 +166,12 @@ class QPTracker(SolvingTracker):
     def _projection_rows(self, q: Array) -> ProjectionRows:
         """What stands around a posture (nq,), with all things where they are."""
         at = self._unbraked(self._lineariser.packed(q, ESCAPE.within))
-        return projection_rows(at, *self._program.bounded(at))
+        rows, room = self._program.bounded(at)
+        gaps = at.gap - np.minimum(at.clearance, ESCAPE.gap)
+        return ProjectionRows(
+            -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
+            np.concatenate([gaps, room]), at.box,
+        )  # fmt: skip
 
     def _unbraked(self, at: PackedLinearisation) -> PackedLinearisation:
         """The same, with joints that need not brake: to get out of the way they go up to their limits."""
@@ -331,14 +324,8 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
     """One step of several that follow each other along a path."""
     displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
     return with_values(
-        steps[-1],
-        q=path[-1][1],
-        displacement=displacement,
-        velocity=displacement / dt,
-        exact=all(step.exact for step in steps),
-        note=next((step.note for step in steps if step.note), ""),
-        iterations=sum(step.iterations for step in steps),
+        steps[-1], q=path[-1][1], displacement=displacement, velocity=displacement / dt, path=tuple(path),
+        exact=all(step.exact for step in steps), note=next((step.note for step in steps if step.note), ""),
+        iterations=sum(step.iterations for step in steps), share=min(step.share for step in steps),
         programs=dict(sum((Counter(step.programs) for step in steps), Counter[str]())),
-        share=min(step.share for step in steps),
-        path=tuple(path),
-    )
+    )  # fmt: skip

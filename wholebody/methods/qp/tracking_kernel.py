@@ -10,12 +10,14 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.active_set_kernel import grow
 from wholebody.methods.qp.dense_kernel import dot
-from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
-from wholebody.methods.qp.rows import (
+from wholebody.methods.qp.quadratic_program import (
     NUMBERS,
+    ActiveSet,
     Bodies,
     LinearRows,
     PackedRows,
+    QuadraticProgram,
+    Room,
     Rows,
     StepParts,
     StepRoom,

@@ -1,7 +1,7 @@
 """Which steps turn some pair nearer than its rows predict: those are looked at where they end, and others are not.
 
-Rows are straight and bodies turn. How much nearer a pair gets by that is bounded for each pair by itself, from what the
-joints between the root and its two pieces do; an arm that is far from everything costs nothing, however it turns.
+How much nearer a pair gets than its straight rows say is bounded for each pair by itself, from what the joints between
+the root and its two pieces do.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import with_loops
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.methods.qp.rows import Bodies, Rows, Seen
+from wholebody.methods.qp.quadratic_program import Bodies, Rows, Seen
 from wholebody.methods.qp.settings import TRACKING
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import PackedLinearisation
@@ -34,12 +34,7 @@ class Turning:
         seen = Seen(TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen)
         self._lengths = np.array(seen)
         place: Indices = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
-        self.joints: tuple[Indices, Indices, Indices, Indices] = (
-            place,
-            state.column_joint,
-            state.parents,
-            np.asarray(table.joint),
-        )
+        self.joints = place, state.column_joint, state.parents, np.asarray(table.joint)
         self._twists = np.empty((3, workspace.model.njoints, 6))
 
     def bodies(self, placements: Array) -> Bodies:

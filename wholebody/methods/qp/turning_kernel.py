@@ -9,7 +9,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot
-from wholebody.methods.qp.rows import Bodies, Near, Rows, Seen
+from wholebody.methods.qp.quadratic_program import Bodies, Near, Rows, Seen
 
 
 @compiled(forceinline=True)

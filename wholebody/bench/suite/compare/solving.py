@@ -33,7 +33,7 @@ from wholebody.bench.suite.compare.results import (
 )
 from wholebody.bench.suite.problem_sets.case import Case, ProblemSet
 from wholebody.bench.tables import programs_text
-from wholebody.methods.base import SolvedStep, Tracker
+from wholebody.methods.base import FrameStep, Tracker
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 
@@ -202,7 +202,7 @@ def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> tuple
         worked, began = processor_time(), time.perf_counter()
         step = tracker.frame(q, method.tolerance)
         q, iterations = step.q, step.iterations
-        judging = step.judging if isinstance(step, SolvedStep) else 0.0
+        judging = step.judging if isinstance(step, FrameStep) else 0.0
         seconds = time.perf_counter() - began - judging
         worked = processor_time() - worked
         if not np.isfinite(q).all():

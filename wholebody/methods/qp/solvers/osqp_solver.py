@@ -16,8 +16,7 @@ from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.methods.qp.active_set import last_resort, solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import CORRECTIONS
-from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
-from wholebody.methods.qp.solvers.split_form import SCALING, read_active, scaled_split
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, SCALING, QPSolver, read_active, scaled_split
 
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 SLOTS = 8  # elastic rows come in multiples of this, so that sizes seldom change; more slots = slower iterations
@@ -118,14 +117,10 @@ class Workspace:
         """Put the program's numbers in."""
         n, m, self.k = self.n, self.m, len(program.least)
         spare = self.slots - self.k
-        form = scaled_split(
-            with_values(
-                program,
-                elastic=np.vstack([program.elastic, np.zeros((spare, n))]),
-                least=np.append(program.least, np.full(spare, SCALING.inactive)),
-                elastic_weight=np.append(program.elastic_weight, np.ones(spare)),
-            )
-        )
+        elastic = np.vstack([program.elastic, np.zeros((spare, n))])
+        least = np.append(program.least, np.full(spare, SCALING.inactive))
+        weight = np.append(program.elastic_weight, np.ones(spare))
+        form = scaled_split(with_values(program, elastic=elastic, least=least, elastic_weight=weight))
         self.hessian, self.gradient = form.diagonal, form.linear
         self.values = np.vstack([np.eye(n, len(form.linear)), form.matrix]).T[self._entries]
         self.low = np.concatenate([form.box[0], form.least])

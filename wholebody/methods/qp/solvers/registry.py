@@ -14,8 +14,7 @@ from wholebody.base.errors import InputError, MissingPackageError, UnknownNameEr
 from wholebody.methods.qp.active_set import compiled_kernel, last_resort, solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import CORRECTIONS
-from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.split_form import SCALING, read_active, scaled_split
+from wholebody.methods.qp.solvers.base import SCALING, QPSolver, read_active, scaled_split
 
 PACKAGES: Mapping[str, str] = MappingProxyType(
     {"daqp": "daqp", "quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
