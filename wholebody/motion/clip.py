@@ -18,8 +18,7 @@ from wholebody.base.checks import array, instance, listed, number, shown, text, 
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
-from wholebody.motion.mirroring import mirrored
-from wholebody.motion.thing_tracks import MIRROR as THING_MIRROR
+from wholebody.motion.mirroring import PLACEMENT, mirrored
 from wholebody.motion.thing_tracks import between, thing_tracks
 
 ROOT_SIZE = 7  # values of a free root
@@ -205,7 +204,7 @@ class Clip(Shown):
         Raises:
             InputError: the figure is not symmetric, or its joints do not name their sides.
         """
-        things = {name: THING_MIRROR * track for name, track in self.things.items()}
+        things = {name: PLACEMENT * track for name, track in self.things.items()}
         return Clip(self.figure, mirrored(self.figure, self.q), self.dt, self.name, things)
 
     def joined(self, other: Clip) -> Clip:

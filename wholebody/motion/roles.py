@@ -18,14 +18,12 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import built, built_figure, link_end, side_of
+from wholebody.motion.structure import LIMBS, built, built_figure, link_end, side_of
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
 ROLES = tuple(row["role"] for row in ROWS)
 """Parts of a body that skeletons and figures have in common. Each but the pelvis may be absent."""
-
-LIMBS = ("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand")
 
 
 class Roles(NamedTuple):
