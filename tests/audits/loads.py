@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tests.audits.templates import TEMPLATES
 from wholebody.bench.measure.motion import recorded, synthetic
 from wholebody.bench.tables import render
