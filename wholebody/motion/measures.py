@@ -34,17 +34,11 @@ class Deviation:
     Attributes:
         angle: root of the mean square over frames and joint coordinates, radians (metres for joints that slide);
             without a free root.
-        greatest_angle: the greatest of them.
         distance: root of the mean square over frames and joints of the distance between the joints' centres, metres.
-        greatest_distance: the greatest of them.
-        frames_changed: frames in which some coordinate differs by more than 1e-6.
     """
 
     angle: float
-    greatest_angle: float
     distance: float
-    greatest_distance: float
-    frames_changed: int
 
 
 def deviation(before: Clip, after: Clip) -> Deviation:
@@ -56,13 +50,7 @@ def deviation(before: Clip, after: Clip) -> Deviation:
     centres = [(joint, np.zeros(3)) for joint in range(1, model.njoints)]
     old, new = (point_paths(clip.figure, clip.q, centres) for clip in (before, after))
     away = np.linalg.norm(old - new, axis=2)
-    return Deviation(
-        angle=_rms(angles),
-        greatest_angle=float(np.abs(angles).max(initial=0.0)),
-        distance=_rms(away),
-        greatest_distance=float(away.max(initial=0.0)),
-        frames_changed=int((np.abs(apart).max(axis=1, initial=0.0) > 1e-6).sum()),
-    )
+    return Deviation(_rms(angles), _rms(away))
 
 
 def jerk_ratio(before: Clip, after: Clip) -> float:
