@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tests.audits.templates import TEMPLATES
 from wholebody.bench.measure.motion import recorded, synthetic
 from wholebody.bench.tables import render
@@ -15,7 +17,7 @@ from wholebody.motion.avoidance import avoid
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import torques
-from wholebody.motion.load_change import PLACE, LoadChange, load_change
+from wholebody.motion.load_change import PLACE, LoadChange
 from wholebody.motion.measures import deviation, foot_sliding
 from wholebody.motion.stance import usual_feet
 from wholebody.motion.strength import Strength
@@ -86,7 +88,8 @@ def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: fl
                 freed = avoid(clip, scene, dynamics=dynamics)
                 spent = time.process_time() - began
                 report = freed.report
-                change = load_change(old, Clip(scene.figure, freed.clip.q, clip.dt), None, strength, feet, scene)
+                after = torques(Clip(scene.figure, freed.clip.q, clip.dt), scene, feet=feet, strength=strength)
+                change = LoadChange(old, after, np.arange(len(clip), dtype=float))
                 if not dynamics:
                     same = LoadChange(change.before, change.before, change.times)
                     yield _row(name, worn, WAYS[0], clip, clip, same, report.before, False, 0.0)

@@ -20,11 +20,8 @@ def test_deviation_of_an_arm(planar_arm: Callable[..., Any]) -> None:
     after = before.with_q(np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.0], [0.0, 0.0]]))
     found = deviation(before, after)
     assert found.angle == pytest.approx(np.sqrt(2 * 0.04 / 8))
-    assert found.greatest_angle == pytest.approx(0.2)
     chord = 2 * 0.5 * np.sin(0.1)
-    assert found.greatest_distance == pytest.approx(chord)
     assert found.distance == pytest.approx(np.sqrt(2 * chord**2 / 8))
-    assert found.frames_changed == 2
 
 
 def test_the_root_counts_in_places_only(free_bodies: Callable[..., Any]) -> None:
@@ -35,7 +32,6 @@ def test_the_root_counts_in_places_only(free_bodies: Callable[..., Any]) -> None
     found = deviation(wb.Clip(figure, q, 0.1), wb.Clip(figure, moved, 0.1))
     assert found.angle == 0.0
     assert found.distance == pytest.approx(0.1)
-    assert found.frames_changed == 3
 
 
 def test_jerk_ratio(planar_arm: Callable[..., Any]) -> None:

@@ -116,6 +116,6 @@ def test_the_box_around_a_shape_is_that_of_a_copy(name: str) -> None:
 def test_the_places_of_a_figure_that_motions_are_fitted_to() -> None:
     figure = wb.load("hand")
     before = pickle.dumps(figure.geometry)
-    places, _, lowest = standing_places(figure, Roles({}, {"hand": "right_palm"}, {}, "none"))
+    places, _, lowest = standing_places(figure, Roles({}, {"hand": "right_palm"}, {}))
     assert pickle.dumps(figure.geometry) == before
     assert places["hand"][2] > lowest

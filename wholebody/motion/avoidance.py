@@ -27,7 +27,7 @@ from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, foreseen, judged
-from wholebody.motion.load_change import load_change
+from wholebody.motion.load_change import LoadChange
 from wholebody.motion.measures import MotionBounds, resolved
 from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
 from wholebody.motion.strength import Strength
@@ -149,11 +149,11 @@ def avoid(
 
             began = time.perf_counter()
             with ctrl_c_ends_all(), suppress(UndefinedTermError):  # what it was before stays
-                found = smoothed(run, result.q, judge.asked)
-                smooth = with_values(result, q=found.q)
+                q, windows = smoothed(run, result.q, judge.asked)
+                smooth = with_values(result, q=q)
                 other = judge.report(smooth, run)
-                if found.windows and (other.solved or other.rough):
-                    result, report = smooth, replace(other, smoothed=found.windows)
+                if windows and (other.solved or other.rough):
+                    result, report = smooth, replace(other, smoothed=windows)
             seconds += time.perf_counter() - began
     return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
 
@@ -177,9 +177,10 @@ class _Judge:
         """What a method made of the clip."""
         change = None
         if self._loads is not None and self._strength is not None:
-            places = None if result.times is None else result.times / self._clip.dt
+            places = np.arange(len(result.q), dtype=float) if result.times is None else result.times / self._clip.dt
             after = self._clip.with_q(result.q)
-            change = load_change(self._loads, after, places, self._strength, self.feet, self.terms.scene)
+            loads = torques(after, self.terms.scene, feet=self.feet, strength=self._strength)
+            change = LoadChange(self._loads, loads, places)
         report = judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
         more = ["the caller ended it" if run.ended else "", run.work.left_out, "" if report.solved else self.foreseen]
         return replace(report, message="; ".join(filter(None, [report.message, *more])))

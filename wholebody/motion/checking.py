@@ -67,7 +67,6 @@ class ClipCheck(Shown):
         speeds: joints faster than their velocity limits, the worst first.
         sliding: how far each point of the feet slides while it stands.
         jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
-        queries: number of distances that coal was asked for.
 
     Examples:
         >>> found = wb.check(clip, scene)
@@ -84,7 +83,6 @@ class ClipCheck(Shown):
     speeds: tuple[Beyond, ...]
     sliding: tuple[Sliding, ...]
     jerk: Array
-    queries: int
 
     @property
     def free(self) -> bool:
@@ -255,7 +253,6 @@ def check(
         speeds=too_fast(clip),
         sliding=sliding(clip.figure, clip.q, clip.dt),
         jerk=root_mean_square(joint_jerk(clip)),
-        queries=swept.asked,
     )
 
 

@@ -18,8 +18,7 @@ from wholebody.base.checks import array, instance, listed, number, shown, text, 
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
-from wholebody.motion.mirroring import mirrored
-from wholebody.motion.thing_tracks import MIRROR as THING_MIRROR
+from wholebody.motion.mirroring import PLACEMENT, mirrored
 from wholebody.motion.thing_tracks import between, thing_tracks
 
 ROOT_SIZE = 7  # values of a free root
@@ -149,16 +148,13 @@ class Clip(Shown):
         q = self.figure.part(name, self.q)
         return Clip(self.figure.members[name].figure, q, self.dt, f"{self.name} of {name}", self.things)
 
-    def with_q(self, q: ArrayLike, name: str | None = None) -> Clip:
-        """The clip with other postures (m, nq), and another name if one is given.
-
-        There may be any number of them; things that move go on only beside as many as before.
-        """
+    def with_q(self, q: ArrayLike) -> Clip:
+        """The clip with other postures (m, nq); things that move go on only beside as many as before."""
         postures = array(q, f"{self.name}: q", "postures, shape (frames, nq)")
         if postures.ndim != 2:
             raise InputError(f"{self.name}: q has shape {postures.shape}; give postures, shape (frames, nq)")
         things = self.things if len(postures) == len(self) else {}
-        return Clip(self.figure, postures, self.dt, self.name if name is None else name, things)
+        return Clip(self.figure, postures, self.dt, self.name, things)
 
     def at(self, t: float) -> Array:
         """Posture (nq,) at a time from 0 to `duration`, interpolated between two frames on the configuration manifold.
@@ -205,7 +201,7 @@ class Clip(Shown):
         Raises:
             InputError: the figure is not symmetric, or its joints do not name their sides.
         """
-        things = {name: THING_MIRROR * track for name, track in self.things.items()}
+        things = {name: PLACEMENT * track for name, track in self.things.items()}
         return Clip(self.figure, mirrored(self.figure, self.q), self.dt, self.name, things)
 
     def joined(self, other: Clip) -> Clip:
@@ -222,11 +218,10 @@ class Clip(Shown):
                 f"{self.name}: its time step is {self.dt:g} s, that of {other.name} {other.dt:g} s; resample one"
             )
         if other.things.keys() != self.things.keys():
-            both = (", ".join(sorted(one.things)) or "nothing" for one in (self, other))
+            mine, theirs = (", ".join(sorted(one.things)) or "nothing" for one in (self, other))
             raise InputError(
-                "{0}: {2} moves beside it, and {3} beside {1}; join clips with the same things".format(
-                    self.name, other.name, *both
-                )
+                f"{self.name}: {mine} moves beside it, and {theirs} beside "
+                f"{other.name}; join clips with the same things"
             )
         things = {name: np.concatenate([track, other.things[name]]) for name, track in self.things.items()}
         return Clip(self.figure, np.concatenate([self.q, other.q]), self.dt, self.name, things)

@@ -100,15 +100,8 @@ def _end(figure: Figure, joint: int) -> tuple[int, Array]:
 
 def _sole(figure: Figure, data: pin.Data, side: str, ankle: str) -> list[tuple[int, Array, Array, Array]]:
     """Joint, and in it the middle, left and right place of the heel and of the front of a sole."""
-    joint = int(figure.model.frames[figure.frame_id(ankle)].parentJoint)
-    joint = next(
-        (
-            int(figure.model.frames[figure.frame_id(name)].parentJoint)
-            for name in (f"{side}_heel",)
-            if name in figure.frames
-        ),
-        joint,
-    )
+    heel = f"{side}_heel"
+    joint = int(figure.model.frames[figure.frame_id(heel if heel in figure.frames else ankle)].parentJoint)
     corners = [np.array(data.oMi[joint].translation)[None]]
     for piece in figure.geometry.geometryObjects:
         if piece.parentJoint == joint:

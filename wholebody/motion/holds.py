@@ -329,20 +329,14 @@ class Holds:
         if point.edge:
             place[2] = self._height(place, stand)
         elif point.foot:
-            for other, stands in enumerate(self._stands):
+            for other, end in enumerate(self.points):
+                rests = [each for each in self._stands[other] if isinstance(each, Foothold)]
                 before = [
                     each
-                    for each in stands
-                    if isinstance(each, Foothold)
-                    and each.first <= stand.first < each.end
-                    and (other, each.first) in self._places
+                    for each in rests
+                    if each.first <= stand.first < each.end and (other, each.first) in self._places
                 ]
-                if (
-                    self.points[other].foot == point.foot
-                    and self.points[other].role != point.role
-                    and not self.points[other].edge
-                    and before
-                ):
+                if end.foot == point.foot and end.role != point.role and not end.edge and before:
                     pivot = self._places[other, before[-1].first]
                     along = np.mean([paths[frame][number] - paths[frame][other] for frame in frames], axis=0)
                     length = float(np.linalg.norm(paths[frames[0]][number] - paths[frames[0]][other]))

@@ -8,7 +8,7 @@ on the joints through the foot's Jacobian.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -25,48 +25,6 @@ ROOT = 6  # degrees of freedom of a free root
 FRICTION = 0.8  # coefficient of friction where none is stated
 LIGHT = 0.2
 """Share of the weight: with less vertical force, in a take-off or landing, the zero moment point says little."""
-
-
-class Soles:
-    """Points of feet that bear force: the lowest corners of their pieces, toes included; and the feet's joints."""
-
-    def __init__(self, figure: Figure, feet: tuple[str, ...]) -> None:
-        """Find the pieces of the feet; `InputError` if one has none."""
-        self.joints: list[int] = []
-        self._pieces: list[list[Any]] = []
-        for foot in feet:
-            joint = figure.model.frames[figure.frame_id(foot)].parentJoint
-            pieces = pieces_on(figure, joint)
-            if joint == 0 or not pieces:
-                raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
-            self.joints.append(joint)
-            self._pieces.append(pieces)
-
-    def points(self, data: pin.Data, stand: list[bool]) -> tuple[Array, Any]:
-        """Points (n, 3) in the world of the feet that stand, and the number of each one's foot (n,)."""
-        points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=int)]
-        for foot, stands in enumerate(stand):
-            if not stands:
-                continue
-            lows = np.vstack(
-                [
-                    outermost(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, DOWN)
-                    for piece in self._pieces[foot]
-                ]
-            )
-            # up to 2 cm above the lowest point: soles are rounded, recordings uneven
-            lows = _outermost(lows[lows[:, 2] <= lows[:, 2].min() + 0.02])
-            points.append(lows)
-            owner.append(np.full(len(lows), foot))
-        return np.vstack(points), np.concatenate(owner)
-
-
-def _outermost(points: Array) -> Array:
-    """The points that are farthest in the horizontal plane in twelve evenly spread directions."""
-    around = 2.0 * np.pi * np.arange(12) / 12  # fewer cut off the ends of a rounded sole
-    far = np.argmax(points[:, :2] @ np.array([np.cos(around), np.sin(around)]), axis=0)
-    found: Array = points[np.unique(far)]
-    return found
 
 
 class GroundForces(NamedTuple):
@@ -173,8 +131,7 @@ class InverseDynamics:
 
     Attributes:
         feet: names of the segments or frames that may stand; none for a root that is fixed.
-        soles: of its feet.
-        joints: of the feet, and those that touch.
+        joints: of the feet, and after them those that touch.
         weight: N.
     """
 
@@ -182,16 +139,33 @@ class InverseDynamics:
         one_figure(figure, "dynamics: the figure")
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
         self.feet = tuple(feet)
-        self.soles = Soles(figure, self.feet)
-        self.joints = [*self.soles.joints, *touching]
+        joints = [int(figure.model.frames[figure.frame_id(foot)].parentJoint) for foot in self.feet]
+        self._soles = [pieces_on(figure, joint) for joint in joints]
+        for foot, joint, pieces in zip(self.feet, joints, self._soles, strict=True):
+            if joint == 0 or not pieces:
+                raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
+        self.joints = [*joints, *touching]
         self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))
         self.free = figure.root == "free"
 
     def stand(self, q: Array, feet: Sequence[bool], touches: Touches | None = None) -> Stand:
         """Where a posture (nq,) stands, on some of the feet, and touches things."""
         pin.forwardKinematics(self._model, self._data, q)
-        points, owner = self.soles.points(self._data, list(feet))
-        found = _standing(points, owner)
+        points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=int)]
+        for foot in np.flatnonzero(feet).tolist():
+            lows = np.vstack(
+                [
+                    outermost(piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement, DOWN)
+                    for piece in self._soles[foot]
+                ]
+            )
+            # up to 2 cm above the lowest point: soles are rounded, recordings uneven
+            lows = lows[lows[:, 2] <= lows[:, 2].min() + 0.02]
+            around = 2.0 * np.pi * np.arange(12) / 12  # fewer directions cut off the ends of a rounded sole
+            far = np.argmax(lows[:, :2] @ np.array([np.cos(around), np.sin(around)]), axis=0)
+            points.append(lows[np.unique(far)])
+            owner.append(np.full(len(points[-1]), foot))
+        found = _standing(np.vstack(points), np.concatenate(owner))
         return found if touches is None else found.touching(touches)
 
     def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:

@@ -12,10 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from wholebody.base.arrays import Array, Mask, brief
 from wholebody.base.charts import new_chart, plain
-from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import Torques, torques
-from wholebody.motion.strength import Strength
-from wholebody.scene.scene import Scene
+from wholebody.motion.clip_torques import Torques
 
 TORQUE = 0.02
 """Share of its bound by which a torque may be beyond it: what filters and the frames in which feet stand change."""
@@ -195,11 +192,3 @@ def _marks(loads: Torques, names: Sequence[str]) -> Mask:
         if name in loads.feet:
             found[:, number] = loads.stands[:, loads.feet.index(name)]
     return found
-
-
-def load_change(
-    before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str], scene: Scene
-) -> LoadChange:
-    """Compare the loads of a clip before and after a change, whose frames are at places (m,) of those before."""
-    places = np.arange(len(after), dtype=np.float64) if places is None else places
-    return LoadChange(before, torques(after, scene, feet=feet, strength=strength), places)

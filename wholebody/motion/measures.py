@@ -23,8 +23,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.figures.state import root_freedoms
 from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
-from wholebody.motion.stance import paths, standing_points
-from wholebody.motion.windows import runs
+from wholebody.motion.stance import paths, point_paths, slid, standing_points
 from wholebody.tasks.base import filled
 
 
@@ -35,17 +34,11 @@ class Deviation:
     Attributes:
         angle: root of the mean square over frames and joint coordinates, radians (metres for joints that slide);
             without a free root.
-        greatest_angle: the greatest of them.
         distance: root of the mean square over frames and joints of the distance between the joints' centres, metres.
-        greatest_distance: the greatest of them.
-        frames_changed: frames in which some coordinate differs by more than 1e-6.
     """
 
     angle: float
-    greatest_angle: float
     distance: float
-    greatest_distance: float
-    frames_changed: int
 
 
 def deviation(before: Clip, after: Clip) -> Deviation:
@@ -54,14 +47,10 @@ def deviation(before: Clip, after: Clip) -> Deviation:
     model = before.figure.model
     apart = np.array([pin.difference(model, *pair) for pair in zip(before.q, after.q, strict=True)])
     angles = apart[:, ~root_freedoms(model)]
-    away = np.linalg.norm(_centres(before) - _centres(after), axis=2)
-    return Deviation(
-        angle=_rms(angles),
-        greatest_angle=float(np.abs(angles).max(initial=0.0)),
-        distance=_rms(away),
-        greatest_distance=float(away.max(initial=0.0)),
-        frames_changed=int((np.abs(apart).max(axis=1, initial=0.0) > 1e-6).sum()),
-    )
+    centres = [(joint, np.zeros(3)) for joint in range(1, model.njoints)]
+    old, new = (point_paths(clip.figure, clip.q, centres) for clip in (before, after))
+    away = np.linalg.norm(old - new, axis=2)
+    return Deviation(_rms(angles), _rms(away))
 
 
 def jerk_ratio(before: Clip, after: Clip) -> float:
@@ -83,23 +72,9 @@ def foot_sliding(before: Clip, after: Clip) -> float:
     which its offset from where it was before changes. It is 0 for a figure that names no points of feet.
     """
     _same(before, after, "foot_sliding")
-    stand, most = standing_points(before.figure, before.q, before.dt), 0.0
+    stand = standing_points(before.figure, before.q, before.dt)
     old, new = (paths(clip.figure, clip.q, tuple(stand)) for clip in (before, after))
-    for k, stands in enumerate(stand.values()):
-        offset = (new[:, k] - old[:, k])[:, :2]
-        for first, end in runs(stands):
-            most = max(most, float(np.linalg.norm(offset[first:end] - offset[first], axis=1).max()))
-    return most
-
-
-def _centres(clip: Clip) -> Array:
-    """(n, njoints - 1, 3) centres of the joints in the world, metres."""
-    model, data = clip.figure.model, clip.figure.model.createData()
-    found = np.zeros((len(clip), model.njoints - 1, 3))
-    for k, q in enumerate(clip.q):
-        pin.forwardKinematics(model, data, q)
-        found[k] = [place.translation for place in data.oMi.tolist()[1:]]
-    return found
+    return max((slid(new[:, k] - old[:, k], stands)[0] for k, stands in enumerate(stand.values())), default=0.0)
 
 
 def _same(before: Clip, after: Clip, what: str) -> None:

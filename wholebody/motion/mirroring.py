@@ -15,6 +15,9 @@ from wholebody.figures.loading import one_figure
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection at the plane y = 0."""
 
+PLACEMENT = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+"""The same of a placement (7,): (x, -y, z), and of a rotation R, which becomes M R M, the x and z of the axis."""
+
 SIDES = (
     ("left", "right"),
     ("Left", "Right"),
@@ -45,8 +48,8 @@ def mirrored(figure: Figure, q: Array) -> Array:
     """
     source, sign = _exchange(one_figure(figure, "mirrored: the clip's figure"))
     found: Array = q[:, source] * sign
-    if figure.root == "free":  # (x, -y, z), and the rotation M R M: the axis's x and z change their signs
-        found[:, :7] = q[:, :7] * (1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
+    if figure.root == "free":
+        found[:, :7] = q[:, :7] * PLACEMENT
     return found
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +26,8 @@ def one_sided(run: Run, q: Array) -> Array:
     depths = depths_between(run.workspace, q, range(len(q) - 1))
     passing = [gap for gap, deep in depths.items() if deep > PASSED]  # frames that overlap are followed too
     parts = [range(*each) for each in pairwise([0, *(gap + 1 for gap in passing), len(q)])]
-    fewer = min((parts[::2], parts[1::2]), key=_frames)
-    if passing and _frames(fewer) <= 0.25 * len(q):
+    fewer = min((parts[::2], parts[1::2]), key=lambda side: sum(map(len, side)))
+    if passing and sum(map(len, fewer)) <= 0.25 * len(q):
         found = q
         for part in fewer:
             gap, side = (part[0] - 1, 1) if part[0] else (part[-1], -1)
@@ -59,12 +58,12 @@ def keep_back(
         for side, postures in list(sides.items()):  # in turn, so that the shorter motion ends both
             if cancelled is not None and cancelled():
                 return False
-            posture = next(postures, None)
+            posture, joined = next(postures, (None, False))
             if posture is None:
                 del sides[side]
                 continue
-            found[side].append(posture.q)
-            if posture.joined:
+            found[side].append(posture)
+            if joined:
                 _put(q, gap, side, found[side])
                 return True
     return False
@@ -95,18 +94,6 @@ def followed(run: Run, window: Window, middle: int) -> Array:
     return q
 
 
-class _Beside(NamedTuple):
-    """A posture (nq,) on the one side of what is passed, and whether the motion to the next frame as it is joins."""
-
-    q: Array
-    joined: bool
-
-
-def _frames(runs: Sequence[range]) -> int:
-    """How many frames some runs have."""
-    return sum(map(len, runs))
-
-
 def _put(q: Array, gap: int, side: int, found: Sequence[Array]) -> None:
     """Put postures that were found after (side 1) or before (-1) a gap into q (n, nq)."""
     begin = gap + 1 if side > 0 else gap + 1 - len(found)
@@ -118,9 +105,9 @@ def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
     q, waiting = np.array(q), list(passing[::-side])
     while waiting:
         gap, found = waiting.pop(), list[Array]()
-        for posture in _beside(run, q, gap, side, PASSED):
-            found.append(posture.q)
-            if posture.joined:
+        for posture, joined in _beside(run, q, gap, side, PASSED):
+            found.append(posture)
+            if joined:
                 _put(q, gap, side, found)
                 break
             if run.watch.tell(1.0, f"frame {gap + side * len(found)} is kept on one side"):
@@ -129,8 +116,8 @@ def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
     return q
 
 
-def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int = 0) -> Iterator[_Beside]:
-    """Frames after (side 1) or before (-1) a gap, on the side of what its motion passes of the frame at its end."""
+def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int = 0) -> Iterator[tuple[Array, bool]]:
+    """Postures after (side 1) or before (-1) a gap, on the side of its end, and whether the next one joins as it is."""
     # They follow the original until the motion to the next frame is no deeper than `passed` [m].
     workspace = run.workspace
     here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
@@ -139,4 +126,4 @@ def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int =
         if max(depth(workspace, there), dip_depth(workspace, here, there)) > SHALLOW:
             return
         here, frame = there, frame + side
-        yield _Beside(here, not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= passed)
+        yield here, not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= passed

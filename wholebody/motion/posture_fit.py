@@ -22,8 +22,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
-from wholebody.motion.retarget_targets import LIMBS, has_trunk, known_bones
+from wholebody.motion.retarget_targets import has_trunk, known_bones
 from wholebody.motion.roles import Roles
+from wholebody.motion.structure import LIMBS
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.residual_kernel import cones as cone_angles
 

@@ -10,7 +10,6 @@ Both are done by the program of the method "trajectory", begun at the method's p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -77,19 +76,12 @@ def _repair(run: Run, window: Window, found: Faults, q: Array) -> bool:
     return better
 
 
-class Smoothed(NamedTuple):
-    """Postures (n, nq), the given ones where none are found that are as free, and how many windows were made smooth."""
-
-    q: Array
-    windows: int
-
-
-def smoothed(run: Run, q: Array, asked: MotionBounds) -> Smoothed:
-    """Make postures q (n, nq) smooth, in a copy, where they are beyond resolved bounds on jerk, speed and deviation."""
+def smoothed(run: Run, q: Array, asked: MotionBounds) -> tuple[Array, int]:
+    """Postures q (n, nq), smooth where they are beyond resolved bounds and others are as free; how many windows are."""
     q, count, clip, terms = np.array(q), 0, run.clip, run.terms
     beyond = excess(clip, clip.with_q(q), asked).beyond
     if not beyond.any():
-        return Smoothed(q, 0)
+        return q, 0
     found = run.faults(terms.q)
     for time in (None, 0.2, 0.4):  # s: the smoothness of the method "trajectory", and more where its jerk is beyond
         windows = ClipRun(run, terms.q, time)
@@ -103,4 +95,4 @@ def smoothed(run: Run, q: Array, asked: MotionBounds) -> Smoothed:
         beyond = excess(clip, clip.with_q(q), asked).beyond
         if not beyond.any() or run.ended:
             break
-    return Smoothed(q, count)
+    return q, count

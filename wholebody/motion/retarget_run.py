@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -164,14 +165,13 @@ class Run:
                 self._done[number] = frame + 1
             come = self._done[number]
         found = [self._found[frame] for frame in range(given, come)]
-        for values in (self._slow, self._even, self._free, self._paths, self._first, self._found, self._deviation):
+        known: tuple[dict[int, Any], ...] = (
+            self._wanted, self._chain, self._slow, self._even, self._free, self._paths, self._first, self._found,
+            self._deviation, self._held, self._dips,
+        )  # fmt: skip
+        for values in known:
             for frame in range(given - KEPT, come - KEPT):
                 values.pop(frame, None)
-        for frame in range(given - KEPT, come - KEPT):
-            self._wanted.pop(frame, None)
-            self._chain.pop(frame, None)
-            self._held.pop(frame, None)
-            self._dips.pop(frame, None)
         return found
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:

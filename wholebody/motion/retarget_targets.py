@@ -18,7 +18,7 @@ from wholebody.geometry.pieces import box_corners
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
 from wholebody.motion.standing_ground import Ground
-from wholebody.motion.structure import upright
+from wholebody.motion.structure import LIMBS, upright
 
 SMALL = 1e-9
 """Metres: shorter vectors have no direction."""
@@ -26,9 +26,6 @@ SMALL = 1e-9
 
 UPRIGHT = 0.7
 """Cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands."""
-
-LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand"))
-"""Ends of bones whose directions are taken from the skeleton, and their lengths from the figure."""
 
 
 class Targets(NamedTuple):

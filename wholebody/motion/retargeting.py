@@ -17,10 +17,8 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import held_points, touching_points
 from wholebody.motion.holds import Holds, Touched
-from wholebody.motion.own_contacts import hand_shares, own_contacts, own_rests
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
-    LIMBS,
     Proportions,
     Wanted,
     known_bones,
@@ -34,7 +32,16 @@ from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import NOTHING, Ground
 from wholebody.motion.standing_ground import ground as find_ground
-from wholebody.motion.thing_contacts import ThingContact, Things, still_things, surface_of
+from wholebody.motion.structure import LIMBS
+from wholebody.motion.thing_contacts import (
+    ThingContact,
+    Things,
+    hand_shares,
+    own_contacts,
+    own_rests,
+    still_things,
+    surface_of,
+)
 from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 

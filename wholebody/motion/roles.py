@@ -18,14 +18,12 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import built, built_figure, link_end, side_of
+from wholebody.motion.structure import LIMBS, built, built_figure, link_end, side_of
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
 ROLES = tuple(row["role"] for row in ROWS)
 """Parts of a body that skeletons and figures have in common. Each but the pelvis may be absent."""
-
-LIMBS = ("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand")
 
 
 class Roles(NamedTuple):
@@ -34,7 +32,6 @@ class Roles(NamedTuple):
     joints: dict[str, str]  # role to joint of the skeleton
     frames: dict[str, str]  # role to frame of the figure
     turns: dict[str, str]  # role to the frame of the figure that has the orientation of the role
-    table: str  # name of the table that matched the skeleton
     # roles of the figure that no joint of the skeleton is known to have, if there are others to name
     missing: tuple[str, ...] = ()
     by_structure: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
@@ -55,7 +52,7 @@ def matched(
 ) -> Roles:
     """The roles that skeleton and figure have in common, by `names` (tables `skeleton` and `figure`) or structure."""
     given = _given(names)
-    table, found, more, said = _joints(motion, given)
+    found, more, said = _joints(motion, given)
     frames = figure_roles(figure)
     frames |= {
         role: frame
@@ -79,7 +76,6 @@ def matched(
         {role: found[role] for role in common},
         {role: frames[role] for role in common},
         {role: segments.get(role, frames[role]) for role in common},
-        table,
         tuple(role for role in asked if role in frames and role not in found),
         tuple(role for role in common if role in more),
         _ends(figure, {role: frames[role] for role in common}),
@@ -100,18 +96,18 @@ def skeleton_roles(
     motion: SkeletonMotion, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None
 ) -> dict[str, str]:
     """Role to joint of a skeleton, of all roles that are known; `names` and errors as for `matched`."""
-    return _joints(motion, _given(names))[1]
+    return _joints(motion, _given(names))[0]
 
 
 def _joints(
     motion: SkeletonMotion, given: Mapping[str, Mapping[str, str]]
-) -> tuple[str, dict[str, str], dict[str, str], dict[str, str]]:
-    """The table that matched, role to joint of all that are known, of those by structure, and of those given."""
-    table, found = _recognised(motion.names)
+) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
+    """Role to joint of all that are known, of those by structure, and of those given."""
+    found = _recognised(motion.names)
     said = _checked(given.get("skeleton", {}), motion.names, "joint of the skeleton")
     found = {role: joint for role, joint in found.items() if joint not in said.values()} | said
     more = {} if said or set(ROLES) <= found.keys() else _by_structure(motion, found)
-    return table, found | more, more, said
+    return found | more, more, said
 
 
 def _by_structure(motion: SkeletonMotion, known: Mapping[str, str]) -> dict[str, str]:
@@ -125,16 +121,16 @@ def _by_structure(motion: SkeletonMotion, known: Mapping[str, str]) -> dict[str,
     return {role: joint for role, joint in found.items() if role not in known and joint not in known.values()}
 
 
-def _recognised(joints: tuple[str, ...]) -> tuple[str, dict[str, str]]:
-    """The column of the table that names most joints, six or more, and those."""
+def _recognised(joints: tuple[str, ...]) -> dict[str, str]:
+    """Role to joint by the column of the table that names most joints, six or more."""
     plain = {_plain(joint): joint for joint in reversed(joints)}
-    best: tuple[str, dict[str, str]] = ("", {})
+    best = dict[str, str]()
     for title in ROWS[0]:
         if title in ("role", "person", "person_turn"):  # no skeletons
             continue
         found = {role: plain[_plain(name)] for role, name in _column(title).items() if _plain(name) in plain}
-        if len(found) >= 6 and len(found) > len(best[1]):
-            best = title, found
+        if len(found) >= 6 and len(found) > len(best):
+            best = found
     return best
 
 

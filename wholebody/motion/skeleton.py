@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -102,16 +102,7 @@ class SkeletonMotion:
         first = whole(first, f"{self.name}: first", 0, len(self))
         last = whole(last, f"{self.name}: last", 0, len(self))
         frames = slice(first, last)
-        return self._with(rotations=self.rotations[frames], positions=self.positions[frames])
-
-    def reversed(self) -> SkeletonMotion:
-        """The frames in the opposite order."""
-        return self._with(rotations=self.rotations[::-1], positions=self.positions[::-1])
-
-    def _with(self, **given: Array) -> SkeletonMotion:
-        return SkeletonMotion(
-            self.names, self.parents, self.offsets, dt=self.dt, name=self.name, notes=self.notes, **given
-        )
+        return replace(self, rotations=self.rotations[frames], positions=self.positions[frames])
 
     @classmethod
     def moved(
@@ -153,10 +144,6 @@ class SkeletonMotion:
             rotations[:, joint] = rotations[:, parent] @ local[:, joint]
             positions[:, joint] = positions[:, parent] + rotations[:, parent] @ offsets[joint]
         return cls(names, parents, offsets, rotations, positions, dt, name, notes)
-
-    def length(self) -> float:
-        """Metres along the longest way through the bones, such as from a foot to the head."""
-        return longest_way(self.parents, self.offsets)
 
 
 def _parents(value: object, name: str) -> Indices:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -86,9 +87,7 @@ class Retargeter:
         self._joints = [motion.names.index(joints[role]) for role in self._feet]
         self._rests: LiveRests | None = None
         if ground is None:
-            known = Ground(
-                (), {role: known.rests[role] for role in self._feet}, known.lowest, (0.0,), 0.0, False, motion.dt
-            )
+            known = replace(known, footholds=(), rests={role: known.rests[role] for role in self._feet})
         surface = None if scene is None else surface_of(scene, ())
         points = held_points(figure, self._roles, known)
         self._holds = Holds(points, known, self._proportions.path, motion.dt, surface)

@@ -20,6 +20,9 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
 
+LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand"))
+"""Ends of the bones of a leg and of an arm, from the trunk outwards."""
+
 PARTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "head")
 UPRIGHT = 0.5  # of a trunk's length: its shoulders stand as high above its hips at least
 SHORT = 0.01  # of the skeleton's longest way: a bone that is shorter has no direction
@@ -96,7 +99,7 @@ def built(motion: SkeletonMotion, stands: bool = False) -> dict[str, str]:
     places = motion.positions[:: max(1, len(motion) // 50)]
     (hips, *legs), (chest, *arms) = pairs
     found = {"pelvis": hips} if hips == chest else {"pelvis": hips, "chest": chest}
-    for pair, parts in ((legs, ("hip", "knee", "ankle", "toe")), (arms, ("shoulder", "elbow", "wrist", "hand"))):
+    for pair, parts in zip((legs, arms), LIMBS, strict=True):
         for side, limb in zip(("left", "right"), _sided(motion, places, pair, legs), strict=True):
             found |= {f"{side}_{part}": joint for part, joint in zip(parts, _parts(motion, limb), strict=False)}
     taken = {joint for limb in (*legs, *arms) for joint in limb.joints}
@@ -119,7 +122,7 @@ def _reach(motion: SkeletonMotion, joint: int) -> float:
 
 def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
     """The three ends of the two longest bones, and the next joint that is apart: of a leg one that is not below it."""
-    size, rest = SHORT * motion.length(), motion.rest()
+    size, rest = SHORT * longest_way(motion.parents, motion.offsets), motion.rest()
     first, middle, last = limb.joints[limb.first : limb.first + 3]
     beyond = [k for k in limb.joints[limb.first + 3 :] if np.linalg.norm(rest[k] - rest[last]) > size]
     offsets = rest[beyond] - rest[last]

@@ -12,9 +12,6 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.geometry.placement import PlacementLike, placement
 
-MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
-"""What a reflection at the plane y = 0 makes of a placement's values."""
-
 
 def thing_tracks(given: Mapping[str, Iterable[PlacementLike]], frames: int, what: str) -> dict[str, Array]:
     """Placements (n, 7) of things by name, checked; `what` names the input in messages.

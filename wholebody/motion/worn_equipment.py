@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import choice, color, instance, known, listed, numbers, shown, text
-from wholebody.base.checks import text as checked_text
 from wholebody.base.errors import InputError
 from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
-from wholebody.geometry.pieces import swept_points
+from wholebody.figures.postures import support
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.geometry.shapes import Box, Mesh, Shape, Sphere
+from wholebody.geometry.shapes import Box, HalfSpace, Mesh, Shape, Sphere
 from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
 from wholebody.scene.scene import Scene
 
@@ -163,14 +161,10 @@ def group_of(figure: Figure, segment: str) -> tuple[str, ...]:
 
 def bounds(shape: Shape) -> tuple[Array, Array]:
     """Least and greatest corner (3,) of a shape's bounding box, metres; `InputError` for a half-space."""
-    extents = [
-        _along(piece.geometry, piece.placement, axis)
-        for axis in np.vstack([np.eye(3), -np.eye(3)])
-        for piece in shape.pieces()
-    ]
-    most = np.array(extents).reshape(6, -1).max(axis=1)
-    if not np.isfinite(most).all():
-        raise InputError(f"a {type(shape).__name__} has no bounds; equipment is a solid of finite size")
+    if isinstance(shape, HalfSpace):
+        raise InputError("a HalfSpace has no bounds; equipment is a solid of finite size")
+    axes, pieces = np.vstack([np.eye(3), -np.eye(3)]), shape.pieces()
+    most = np.array([max(support(piece.geometry, piece.placement, axis) for piece in pieces) for axis in axes])
     return -most[3:], most[:3]
 
 
@@ -179,21 +173,13 @@ def _surface(figure: Figure, segment: str, outward: Array, where: str) -> float:
     frame = figure.model.frames[figure.frame_id(segment)]
     back = frame.placement.inverse()
     found = [
-        _along(piece.geometry, back * piece.placement, outward)
+        support(piece.geometry, back * piece.placement, outward)
         for piece in figure.geometry.geometryObjects
         if figure.model.frames[piece.parentFrame].name == segment
     ]
     if not found:
         raise InputError(f"{where}: {segment!r} has no pieces to wear something on; choose another segment")
     return max(found)
-
-
-def _along(geometry: object, at: pin.SE3, direction: Array) -> float:
-    """How far a piece reaches along a unit direction, metres."""
-    swept = swept_points(geometry)
-    local = at.rotation.T @ direction
-    reach = float((swept.points @ local).max()) + swept.radius if len(swept.points) else swept.reach
-    return float(at.translation @ direction) + reach
 
 
 NOTHING = "nothing"
@@ -303,5 +289,5 @@ def label(worn: Worn) -> str:
 
 
 def _names(worn: object) -> list[str]:
-    text = checked_text(worn, "equipment")
-    return [text] if is_file(text) else text.split("+")
+    names = text(worn, "equipment")
+    return [names] if is_file(names) else names.split("+")

@@ -27,13 +27,13 @@ from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.checking import check
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import READERS
-from wholebody.motion.retarget_targets import LIMBS, rest_axes, standing_places
+from wholebody.motion.retarget_targets import rest_axes, standing_places
 from wholebody.motion.retargeting import errors_of
 from wholebody.motion.roles import ROWS, Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import ground
-from wholebody.motion.structure import upright
+from wholebody.motion.structure import LIMBS, upright
 
 ABOUT = """\
 Recordings retargeted by `wb.retarget` on the ground that it finds, and by mink frame by frame with the stages, \

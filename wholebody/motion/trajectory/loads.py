@@ -19,7 +19,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import CUTOFF, smoothed
+from wholebody.motion.clip_torques import CUTOFF, bearing, smoothed
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import (
     FRICTION,
@@ -30,7 +30,6 @@ from wholebody.motion.inverse_dynamics import (
     Stand,
     zero_moment_point,
 )
-from wholebody.motion.load_contacts import bearing
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.trajectory.deviations import Chart
@@ -107,7 +106,7 @@ class ClipLoads:
         dynamics, _, own = bearing(clip, smoothed(clip, CUTOFF).q, feet, terms.scene, FRICTION)
         lower, upper = torque_limits(clip.figure, strength)
         # Where a foot is held beside its place, the original stands in its own.
-        joints = dynamics.soles.joints
+        joints = dynamics.joints[: len(dynamics.feet)]
         stands = [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]
         inside = tuple(np.zeros(len(each.normals)) for each in own)
         found = cls(clip, terms.scene, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
