@@ -14,6 +14,7 @@ import pytest
 
 import wholebody as wb
 from tests.motion.test_retargeting import places
+from wholebody.motion import posture_fit
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import standing
 from wholebody.motion.standing_ground import Foothold
@@ -212,6 +213,25 @@ def test_speed_limits_hold() -> None:
     slow.model.velocityLimit = limit
     clip = wb.retarget(motion, slow)
     assert np.abs(clip.velocities()[:, 6:]).max() < 3.0 * (1.0 + 1e-3)
+
+
+def test_frames_without_room_are_told_and_their_programs_stay_small(
+    human: wb.Figure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    low = wb.Scene(human).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 0.7))
+    rows, solve = list[int](), posture_fit.daqp.solve
+
+    def counted(*program: Any, **settings: Any) -> Any:
+        rows.append(len(program[2]))
+        return solve(*program, **settings)
+
+    monkeypatch.setattr(posture_fit.daqp, "solve", counted)
+    with pytest.warns(UserWarning, match="3 of 3 frames overlap by 2 mm or more") as told:
+        clip = wb.retarget(walker(flat, 0.1)[0], human, low)
+    check = wb.check(clip, low)
+    assert (check.depth > 2e-3).all()
+    assert any(f"by {1e3 * check.deepest:.0f} mm" in str(one.message) for one in told)
+    assert max(rows) < len(low.geometry.collisionPairs)  # those of ways between frames that both overlap came to ten times as many
 
 
 def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -> None:

@@ -139,9 +139,15 @@ class Fitter:
         self._state.update(q)
         return bool((self._cone_angles() < -CONE_SLACK).any())
 
-    def overlaps(self, q: Array, depth: float = CLEARANCE) -> bool:
-        """Whether a pair overlaps at a posture (nq,) by more than a depth, metres."""
-        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) < -depth)
+    def depth(self, q: Array) -> float:
+        """The deepest overlap at a posture (nq,), metres; 0 without one."""
+        return -float(self._workspace.near(q, 0.0).distance.min(initial=0.0))
+
+    def deepest(self, q: Array) -> tuple[str, str]:
+        """What the pair that overlaps most at a posture (nq,) is part of."""
+        near, owners = self._workspace.near(q, 0.0), self._workspace.owners
+        first, second = near.pair[near.distance.argmin()]
+        return owners[first], owners[second]
 
     def cost(self, q: Array, goals: Goals) -> float:
         """Half the sum of the squared weighted errors."""

@@ -30,7 +30,7 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.faults import DIP
 from wholebody.motion.holds import Holds
-from wholebody.motion.posture_fit import Fitter, Goals, Midway, layout_of, levers
+from wholebody.motion.posture_fit import CLEARANCE, Fitter, Goals, Midway, layout_of, levers
 from wholebody.motion.retarget_targets import Targets, Wanted, has_trunk, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
@@ -283,8 +283,7 @@ class Run:
         deviation, change = self._latest
         expected = np.exp(-dt / RETURN) * (deviation + np.exp(-dt / GOES_ON) * change)
         reference = np.asarray(pin.integrate(model, free, expected))
-        shift = deviation[:3] if self.figure.root == "free" else np.zeros(3)
-        shift = pin.XYZQUATToSE3(free[:7]).rotation @ shift if self.figure.root == "free" else shift
+        shift = pin.XYZQUATToSE3(free[:7]).rotation @ deviation[:3] if self.figure.root == "free" else np.zeros(3)
         before = np.asarray(pin.integrate(model, self._free[k - span], self._first[k - span])) if k else None
         self.fitter.see(holds.moved(k))
         q = self.fitter.reached(before, reference, span * self.most)
@@ -331,9 +330,8 @@ class Run:
         found = self._deviation[inside]
         if inside == k or not last:
             return found
-        return np.asarray(
-            found + 0.5 * abs(k - inside) / span * (found - self._deviation[inside + np.sign(inside - k) * span])
-        )
+        inner = self._deviation[inside + np.sign(inside - k) * span]
+        return np.asarray(found + 0.5 * abs(k - inside) / span * (found - inner))
 
     def _swept(self, k: int, omega: float, span: int, start: Array | None = None) -> None:
         """Solve a frame anew between those `span` and twice as far away; from `start` in reach of the next too."""
@@ -353,7 +351,7 @@ class Run:
         q = self.fitter.reached(before, reference if start is None else start, span * self.most)
         midway = self._midway(k) if span == 1 and omega < LATE else []
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
-            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.overlaps(q)):
+            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > CLEARANCE):
                 break
             if number >= 4 * SWEEP:  # what is wanted draws q to and fro across an edge: then the least way back inside
                 goals, midway = with_values(goals, posture=q), []
@@ -369,7 +367,9 @@ class Run:
             return
         known, ends = self._dips.setdefault(k, []), (self._found[k - 1], self._found[k])
         for share in (number / parts for number in range(1, parts)):
-            if share not in known and self.fitter.overlaps(pin.interpolate(self.model, *ends, share), DIP):
+            depth = self.fitter.depth(pin.interpolate(self.model, *ends, share))
+            # an end that overlaps is to be mended first: rows of its way would be many, and cost most of the time
+            if share not in known and depth > DIP and max(map(self.fitter.depth, ends)) < CLEARANCE:
                 known.append(share)
 
     def _mended(self, k: int) -> None:

@@ -17,6 +17,7 @@ from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.held_points import held_points, touching_points
 from wholebody.motion.holds import Holds, Touched
+from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
     Proportions,
@@ -44,6 +45,8 @@ from wholebody.motion.thing_contacts import (
 )
 from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
+
+DEEP = 2e-3  # m: frames that overlap by so much are told
 
 
 def retarget(
@@ -122,7 +125,7 @@ def retarget(
     world = Scene(figure) if scene is None else scene
     if scene is None and ground is not None and figure.root == "free":
         world.add(HalfSpace(), name="floor")
-    frames, lost = wanted_of(wanted, roles), ""
+    frames, lost, inside = wanted_of(wanted, roles), "", ""
     with world.borrow() as workspace:
         alone = Run(figure, wanted, roles, motion.dt, None, workspace)
         alone.led_by(frames)
@@ -143,9 +146,12 @@ def retarget(
             q = _postures(next(runs), frames, progress, 0.3)
             if lost := holds.give_up():
                 q = _postures(next(runs), frames, progress, 0.3)
+            inside = _said_inside(alone.fitter, holds, q)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
     if lost:
         warn(f"retarget: {motion.name}: {lost}, which it lets go of there; things keep their places and sizes")
+    if inside:
+        warn(f"retarget: {motion.name}: {inside}; wb.check lists all, wb.avoid frees what can be free")
     if said := said_of(errors_of(motion, clip, roles)):
         warn(f"retarget: {motion.name}: {said}; bone_errors has them frame by frame")
     return clip
@@ -162,6 +168,23 @@ def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | 
     if tell is not None:
         tell(1.0)
     return np.array(found)
+
+
+def _said_inside(fitter: Fitter, holds: Holds, q: Array) -> str:
+    """What is known of frames (n, nq) that overlap deeply; empty without one."""
+    depths = np.zeros(len(q))
+    for frame, posture in enumerate(q):
+        fitter.see(holds.moved(frame))
+        depths[frame] = fitter.depth(posture)
+    worst = int(depths.argmax())
+    if depths[worst] < DEEP:
+        return ""
+    fitter.see(holds.moved(worst))
+    first, second = fitter.deepest(q[worst])
+    return (
+        f"{(depths >= DEEP).sum()} of {len(q)} frames overlap by {1e3 * DEEP:.0f} mm or more, most of all {first} and "
+        f"{second} by {1e3 * depths[worst]:.0f} mm in frame {worst}"
+    )
 
 
 def _contacts(
