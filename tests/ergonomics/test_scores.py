@@ -6,13 +6,17 @@ import itertools
 import json
 from math import radians
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.reference import worksheets
 from wholebody.cli.main import main
-from wholebody.ergonomics.observation import published
+from wholebody.ergonomics.observation import published, reba_of, rula_of
+from wholebody.ergonomics.work import Coupling, Seen
 
 
 @pytest.fixture(scope="module")
@@ -47,47 +51,48 @@ def test_rula_by_its_printed_tables(parts: tuple[int, ...], a: int, b: int, scor
     assert (found.arm, found.body, found.score) == (a, b, score)
 
 
-WORKSHEET_A = """
-12222333 22223333 23333344
-23333444 33333444 34444455
-33444455 34444455 44444555
-44444555 44444555 44455566
-55555667 56666777 66677778
-77777889 88888999 99999999
-"""  # upper arm by lower arm; in a number wrist and twist
-WORKSHEET_B = """
-132334556677 232345556777 333445566777 555667777788 777778888888 888888899999
-"""  # neck; in a number trunk and legs
-WORKSHEET_C = "1233455 2234455 3334456 3334566 4445677 4456677 5566777 5567777"
-
-
 def test_rula_tables_are_those_of_the_printed_worksheet() -> None:
     """Written down anew, as the worksheet of Cornell University lays them out."""
-    for name, sheet in (("A", WORKSHEET_A), ("B", WORKSHEET_B), ("C", WORKSHEET_C)):
-        assert flat(published("rula")[name]) == [int(digit) for digit in "".join(sheet.split())]
-
-
-REBA_SHEET_A = """
-1234 1234 3356
-2345 3456 4567
-2456 4567 5678
-3567 5678 6789
-4678 6789 7899
-"""  # trunk by neck; in a number legs
-REBA_SHEET_B = "122 123 123 234 345 455 455 567 678 788 788 899"  # upper arm by lower arm; in a number wrist
-REBA_SHEET_C = """
-111233456777  122344566778  233345677888  344456788999
-444567889999  66678899AAAA  7778999AABBB  8889AAAAABBB
-999AAABBBCCC  AAABBBBCCCCC  BBBBCCCCCCCC  CCCCCCCCCCCC
-"""  # score of table A by that of table B; hexadecimal
+    for name, sheet in (("A", worksheets.RULA_A), ("B", worksheets.RULA_B), ("C", worksheets.RULA_C)):
+        assert flat(published("rula")[name]) == worksheets.digits(sheet)
 
 
 def test_reba_tables_are_those_of_the_printed_worksheet() -> None:
     """Written down anew, as the employee assessment worksheet lays them out: table A by trunk, not by neck."""
-    by_trunk = np.array([[int(d) for d in word] for word in REBA_SHEET_A.split()]).reshape(5, 3, 4)
+    by_trunk = np.reshape(worksheets.digits(worksheets.REBA_A), (5, 3, 4))
     assert np.array_equal(np.array(published("reba")["A"]), by_trunk.transpose(1, 0, 2))
-    assert flat(published("reba")["B"]) == [int(digit) for digit in "".join(REBA_SHEET_B.split())]
-    assert flat(published("reba")["C"]) == [int(digit, 16) for digit in "".join(REBA_SHEET_C.split())]
+    assert flat(published("reba")["B"]) == worksheets.digits(worksheets.REBA_B)
+    assert flat(published("reba")["C"]) == worksheets.digits(worksheets.REBA_C)
+
+
+def test_scores_of_random_postures_are_those_of_the_worksheets(person: wb.Figure) -> None:
+    """500 postures and works, whose scores the worksheets, followed step by step, give too."""
+    rng = np.random.default_rng(38)
+    limits, seen, grips = person.limits, {"rula": set[int](), "reba": set[int]()}, get_args(Coupling)
+    for _ in range(500):
+        q = person.posture("standing")
+        # by shares of the ranges, as most people stand and work within a small part of these
+        joint = q[limits.idx_q] + rng.uniform(0.0, 1.0) * (rng.uniform(limits.lower, limits.upper) - q[limits.idx_q])
+        q[limits.idx_q] = np.clip(joint, limits.lower, limits.upper)
+        tilt = rng.normal(size=3) * rng.choice((0.0, 0.1, 0.5))
+        q[3:7] = pin.Quaternion(pin.exp3(tilt)).coeffs()
+        static, repeated, shock, unstable, arms, legs, seated = rng.random(7) < (0.3, 0.3, 0.1, 0.2, 0.2, 0.8, 0.4)
+        work = wb.ergonomics.Work(
+            load=float(rng.choice((0.0, 1.9, 2.0, 5.0, 10.0, 12.0))), static=bool(static), repeated=bool(repeated),
+            shock=bool(shock), unstable=bool(unstable), coupling=grips[rng.integers(4)], arms_supported=bool(arms),
+            legs_supported=bool(legs), seated=bool(seated), back_supported=(None, True, False)[rng.integers(3)],
+            walking=not seated and bool(rng.random() < 0.2),
+        )  # fmt: skip
+        angles = wb.ergonomics.body_angles(person, q)
+        shown = Seen(person, angles, work, "")
+        for name, found, other in (
+            ("rula", rula_of(shown), worksheets.rula),
+            ("reba", reba_of(shown), worksheets.reba),
+        ):
+            expected = [other(angles, side, work) for side in ("left", "right")]
+            assert [found.left.score, found.right.score] == expected, (name, angles, work)
+            seen[name].update(expected)
+    assert min(map(len, seen.values())) >= 5, seen
 
 
 def test_reba_by_the_example_of_a_public_package() -> None:
@@ -261,9 +266,18 @@ def test_who_leans_at_a_thing_or_lies_on_it_does_not_sit(person: wb.Figure) -> N
 
 
 def test_one_leg_is_told_from_two(person: wb.Figure) -> None:
-    lifted = bent(person, left_hip_flexion=60, left_knee_flexion=60)
+    lifted = bent(person, left_hip_flexion=60, left_knee_flexion=50)
     assert wb.ergonomics.owas(person, lifted).legs == 3
-    assert wb.ergonomics.reba(person, lifted).right.legs == 2
+    assert wb.ergonomics.reba(person, lifted).right.legs == 3  # one leg, and a knee between 30 and 60 degrees
+
+
+def test_reba_scores_legs_once_for_both_arms(person: wb.Figure) -> None:
+    """Group A of the score sheet has one box for legs, "+2 if knee(s) > 60": the other side's arm counts with it."""
+    lunge = bent(person, left_knee_flexion=70, left_hip_flexion=35, right_shoulder_flexion=100)
+    found = wb.ergonomics.reba(person, lunge)
+    assert found.left.legs == found.right.legs >= 3
+    assert found.worse == "right"
+    assert found.score == worksheets.reba(wb.ergonomics.body_angles(person, lunge), "right", wb.ergonomics.Work())
 
 
 def test_scores_print_as_a_table(person: wb.Figure) -> None:

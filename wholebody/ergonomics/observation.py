@@ -5,7 +5,9 @@ tables are those of the paper as the worksheets of A. Hedge (Cornell University)
 public implementations were compared with table C; eight agree in every cell. Loads are the paper's: of more than 10 kg
 now and then it scores 2, which the worksheets shorten to 3.
 
-REBA, rapid entire body assessment: S. Hignett and L. McAtamney, Applied Ergonomics 31, 2000, pages 201 to 205.
+REBA, rapid entire body assessment: S. Hignett and L. McAtamney, Applied Ergonomics 31, 2000, pages 201 to 205. The
+paper raises the upper arm's score where it is "abducted or rotated", the worksheets where it is abducted: rotation of
+the upper arm about its axis is not scored here.
 
 OWAS, Ovako working posture analysing system: O. Karhu, P. Kansi, I. Kuorinka, Applied Ergonomics 8(4), 1977. The action
 categories are those of Karhu, Härkönen, Sorvali and Vepsäläinen, Applied Ergonomics 12(1), 1981, as handbooks tabulate
@@ -185,7 +187,7 @@ class RebaParts(Checked):
 
 
 class Reba(BothSides):
-    """REBA of both sides: the parts with the arm and the leg of each side.
+    """REBA of both sides: neck, trunk and legs are scored once, for the body, and the arm of each side.
 
     Examples:
         >>> reba = wb.ergonomics.reba(human, standing)
@@ -312,7 +314,9 @@ def _rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
 
 
 def _reba_parts(angles: BodyAngles, side: str, work: Work) -> RebaParts:
-    arm, bent, knee = angles.side(side), angles.trunk_flexion, angles.side(side).knee_flexion
+    arm, bent = angles.side(side), angles.trunk_flexion
+    # "knee(s)": the paper scores legs once, as neck and trunk, and the arms of both sides
+    knee = max(angles.left.knee_flexion, angles.right.knee_flexion)
     head = 1 if -radians(NEUTRAL) <= angles.neck_flexion <= radians(20.0) else 2
     twisted = abs(arm.wrist_deviation) > DEVIATED or abs(arm.forearm_twist) > END_OF_TWIST
     trunk = min(_grade(abs(bent), NEUTRAL, 20.0, 60.0), 4 if bent > 0.0 else 3)
