@@ -182,12 +182,12 @@ def test_chains_of_equalities_hold_in_any_order_of_the_file(seed: int, tmp_path:
         assert theirs.ne == 4
 
 
-def test_the_range_of_a_follower_that_excludes_its_leaders_is_left_out(tmp_path: Path) -> None:
+def test_the_range_of_a_follower_that_leaves_its_leader_no_room_is_left_out(tmp_path: Path) -> None:
     linear = '<equality><joint joint1="slide2" joint2="slide" polycoef="0 1 0 0 0"/></equality></mujoco>'
     second = '<body><joint name="slide2" type="slide" range="0.2 0.3" limited="true"/><geom size="0.01"/></body>'
     text = ARM.replace("</mujoco>", linear).replace("<site", f"{second}<site")
     figure = wb.load(written(tmp_path, text))
-    assert "joint 'slide2': its range excludes that of 'slide', so it is left out" in figure.notes
+    assert "joint 'slide2': its range leaves 'slide' no room, so it is left out" in figure.notes
     slot = figure.model.joints[figure.joint_id("slide")].idx_q
     assert (figure.model.lowerPositionLimit[slot], figure.model.upperPositionLimit[slot]) == (0.0, 0.1)
 

@@ -153,9 +153,9 @@ class RobotBuilder:
         for follower, law in self._laws.items():
             if law.leader == joint and theirs.jnt_limited[follower]:
                 ends = sorted((float(end) - law.offset) / law.slope for end in theirs.jnt_range[follower])
-                if max(low, ends[0]) > min(high, ends[1]):
+                if max(low, ends[0]) >= min(high, ends[1]):
                     names = (shown(self._file.names["joint"][each]) for each in (follower, joint))
-                    self._notes.append("joint {}: its range excludes that of {}, so it is left out".format(*names))
+                    self._notes.append("joint {}: its range leaves {} no room, so it is left out".format(*names))
                     continue
                 low, high = max(low, ends[0]), min(high, ends[1])
         return low, high
