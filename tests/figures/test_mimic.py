@@ -176,6 +176,11 @@ def test_what_cannot_be_obeyed_is_told(load: Callable[..., wb.Figure]) -> None:
     chain = [joint("j", "a", "b"), joint("k", "b", "c", follow("nobody")), joint("l", "c", "d"), joint("m", "d", "e")]
     figure = load(text(*chain))
     assert any("joint 'k': it mimics 'nobody', which is not in the file" in note for note in figure.notes)
+    back = joint("k", "b", "c", follow("j", -1.0)).replace('lower="-1"', 'lower="0"')
+    figure = load(text(chain[0].replace('lower="-1"', 'lower="0"'), back, *chain[2:]))
+    assert "joint 'k': its limits leave 'j' no room, so they are left out" in figure.notes
+    place = figure.model.joints[figure.joint_id("j")].idx_q
+    assert (figure.model.lowerPositionLimit[place], figure.model.upperPositionLimit[place]) == (0.0, 2.0)
     circle = [joint("j", "a", "b", follow("k")), joint("k", "b", "c", follow("j")), *chain[2:]]
     with pytest.raises(FileFormatError, match="mimics it in turn"):
         load(text(*circle))

@@ -267,7 +267,8 @@ class _Finder:
     def _report(self, status: Any, name: str, away: float, angle: float, by: str) -> None:
         if max(away, angle) > CLEAR:
             far = f"{1e3 * away:.3g} mm" if away > CLEAR else f"{np.degrees(angle):.3g} degrees"
-            self.found.append(Contradiction(status, f"{name}, is {far} from where {by}, keeps that part"))
+            by = f"{by}," if "," in by else by  # "constraints[0], Hold('hand')," and "the world"
+            self.found.append(Contradiction(status, f"{name}, is {far} from where {by} keeps that part"))
 
     def _overlap(self, a: int, b: int, distance: float, asked: float) -> str:
         owners, joint = self._workspace.owners, self._workspace.table.joint.tolist()

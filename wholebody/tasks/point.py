@@ -62,7 +62,7 @@ class Point(Goal):
 class CenterOfMass(Goal):
     """Move the figure's centre of mass to a position, or above one.
 
-    The error is the centre of mass minus the target, in world axes [m].
+    The error is the centre of mass minus the target, in world axes [m]. What is fixed to the world does not count.
 
     Attributes:
         target: (3,) position in the world [m].

@@ -161,6 +161,37 @@ def test_a_linear_equality_is_followed_and_others_are_told(tmp_path: Path) -> No
     assert "joint 'swing': its <equality> is not linear in another joint, so it moves by itself" in notes
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_chains_of_equalities_hold_in_any_order_of_the_file(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    body = '<body pos="0.3 0 0"><joint name="j{}" axis="0 1 0" ref="{:.3f}"/><geom size="0.02"/>'
+    tree = "".join(body.format(k, rng.uniform(-0.5, 0.5)) for k in range(5)) + 5 * "</body>"
+    joint = '<joint joint1="j{}" joint2="j{}" polycoef="{:.3f} {:.3f} 0 0 0"/>'
+    pairs = [rng.permutation((int(rng.integers(0, k)), k)) for k in range(1, 5)]
+    laws = [joint.format(*pair, rng.uniform(-0.3, 0.3), rng.choice([-1.5, 0.5, 1.2])) for pair in pairs]
+    text = f"<body><geom size='0.1'/>{tree}</body></worldbody><equality>{''.join(rng.permutation(laws))}"
+    path = written(tmp_path, f'<mujoco><compiler angle="radian"/><worldbody>{text}</equality></mujoco>')
+    model, figure = mujoco.MjModel.from_xml_path(str(path)), wb.load(path, samples=0)
+    assert set(figure.followers) == {"j1", "j2", "j3", "j4"}
+    theirs = mujoco.MjData(model)
+    for value in (-0.4, 0.7):
+        values = figure.joint_values(figure.with_joints(figure.neutral, {"j0": value}))
+        theirs.qpos[:] = [values[model.joint(k).name] for k in range(model.njnt)]
+        mujoco.mj_forward(model, theirs)
+        assert np.abs(theirs.efc_pos[: theirs.ne]).max() < 1e-9
+        assert theirs.ne == 4
+
+
+def test_the_range_of_a_follower_that_leaves_its_leader_no_room_is_left_out(tmp_path: Path) -> None:
+    linear = '<equality><joint joint1="slide2" joint2="slide" polycoef="0 1 0 0 0"/></equality></mujoco>'
+    second = '<body><joint name="slide2" type="slide" range="0.2 0.3" limited="true"/><geom size="0.01"/></body>'
+    text = ARM.replace("</mujoco>", linear).replace("<site", f"{second}<site")
+    figure = wb.load(written(tmp_path, text))
+    assert "joint 'slide2': its range leaves 'slide' no room, so it is left out" in figure.notes
+    slot = figure.model.joints[figure.joint_id("slide")].idx_q
+    assert (figure.model.lowerPositionLimit[slot], figure.model.upperPositionLimit[slot]) == (0.0, 0.1)
+
+
 def test_a_ball_keeps_the_range_of_its_swing(tmp_path: Path) -> None:
     ball = ARM.replace(
         '<joint name="swing" axis="0 1 0" range="-1 1" limited="true"/>',

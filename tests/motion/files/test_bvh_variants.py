@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import wholebody as wb
 from wholebody.motion.reading import read_skeleton
 from wholebody.motion.skeleton import SkeletonMotion
 
@@ -126,3 +127,30 @@ def test_units_are_those_that_make_a_person_of_a_persons_proportions(unit: str, 
     path.write_text(text(f"ROOT h {{ OFFSET 0 0 0 CHANNELS {SIX}\nJOINT f {{ OFFSET 0 10 0 CHANNELS {PLAIN}\nEnd Site "
                          "{ OFFSET 0 8 0 } } }", np.zeros((2, 9))))  # fmt: skip
     assert "lengths are in centimetres" in read_skeleton(path).notes
+
+
+def test_a_person_whose_root_is_turned_stands_along_the_axis_that_is_up_in_the_motion(tmp_path: Path) -> None:
+    body, path = skeleton_of_a_person(1.0), tmp_path / "a.bvh"
+    rows = np.zeros((4, 6 + 3 * body.count("JOINT")))
+    rows[:, :6] = [[0.1 * k, 0.2 * k, 0.96, 0.0, 90.0, 5.0 * k] for k in range(4)]  # about x, which lifts y to z
+    path.write_text(text(body, rows))
+    found = read_skeleton(path)
+    assert "z is up in the motion, though y is in the rest posture" in found.notes
+    assert found.positions[:, :, 2].min() == pytest.approx(0.0, abs=0.1)
+    assert np.allclose(np.ptp(found.positions[:, :, 2], axis=1), 0.96 + 0.8, atol=0.1)
+    np.testing.assert_allclose(found.positions[:, 0], rows[:, :3], atol=1e-12)
+    rows[:, 4] = 0.0
+    rows[:, :3] = [0.0, 0.96, 0.0]
+    path.write_text(text(body, rows))
+    assert read_skeleton(path).notes[0] == "y is up"
+
+
+def test_a_written_person_who_lies_with_the_feet_at_the_origin_lies_when_read(tmp_path: Path, human: wb.Figure) -> None:
+    lying = np.array(human.neutral)
+    lying[:7] = 0.95, 0.0, 0.1, 0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)  # on the front, the head along x
+    clip = wb.Clip(human, np.array([lying, lying]), dt=0.02)
+    again = wb.read_clip(clip.write(tmp_path / "lying.bvh"), human)
+    for frame in range(2):
+        for name in ("head_top", "left_foot"):
+            there = human.placement(again.q[frame], name).translation
+            assert there == pytest.approx(human.placement(lying, name).translation, abs=1e-5)

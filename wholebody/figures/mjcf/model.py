@@ -153,6 +153,10 @@ class RobotBuilder:
         for follower, law in self._laws.items():
             if law.leader == joint and theirs.jnt_limited[follower]:
                 ends = sorted((float(end) - law.offset) / law.slope for end in theirs.jnt_range[follower])
+                if max(low, ends[0]) >= min(high, ends[1]):
+                    names = (shown(self._file.names["joint"][each]) for each in (follower, joint))
+                    self._notes.append("joint {}: its range leaves {} no room, so it is left out".format(*names))
+                    continue
                 low, high = max(low, ends[0]), min(high, ends[1])
         return low, high
 
@@ -193,14 +197,14 @@ class RobotBuilder:
                 continue
             why = self._unlike(row, first, second, mine)
             if not why:
-                law = self._law(row, first, second)
-                if first < second:
-                    first, law = second, Law(first, 1.0 / law.slope, -law.offset / law.slope)
-                while law.leader in laws:
-                    above = laws[law.leader]
-                    law = Law(above.leader, law.slope * above.slope, law.offset + law.slope * above.offset)
-                if first not in laws and first != law.leader:
-                    laws[first] = law
+                given, own, other = self._law(row, first, second), _leading(laws, first), _leading(laws, second)
+                slope = given.slope * other.slope / own.slope
+                law = Law(other.leader, slope, (given.slope * other.offset + given.offset - own.offset) / own.slope)
+                follower = own.leader
+                if follower < law.leader:
+                    follower, law = law.leader, Law(follower, 1.0 / law.slope, -law.offset / law.slope)
+                if follower != law.leader:
+                    laws[follower] = law
                     continue
                 why = "is one of several, of which the first is kept"
             name = self._file.names["joint"][int(theirs.eq_obj1id[row])]
@@ -211,7 +215,7 @@ class RobotBuilder:
             self._notes.append(
                 f"{others} <equality> between bodies or tendons: not kept; these parts move by themselves"
             )
-        return laws
+        return {joint: _leading(laws, joint) for joint in laws}
 
     def _unlike(self, row: int, first: int, second: int, mine: set[int]) -> str:
         """Why a joint does not follow another by an equality; empty if it does."""
@@ -257,6 +261,15 @@ class RobotBuilder:
                 "and not for the twist about it"
             )
         return made
+
+
+def _leading(laws: dict[int, Law], joint: int) -> Law:
+    """A joint's value by the joint that leads it and follows none; by itself where it follows none."""
+    found = Law(joint, 1.0, 0.0)
+    while found.leader in laws:
+        above = laws[found.leader]
+        found = Law(above.leader, found.slope * above.slope, found.offset + found.slope * above.offset)
+    return found
 
 
 def _inertia(theirs: Any, body: int) -> pin.Inertia:

@@ -71,8 +71,9 @@ def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, .
         own = by_name[name]
         low, high = sorted((end - law.offset) / law.multiplier for end in (own.lower, own.upper))
         kept = max(low, ends[law.joint][0]), min(high, ends[law.joint][1])
-        if kept[0] > kept[1]:
-            note = f"its limits exclude those of {shown(law.joint)}, so they are left out"
+        if kept[0] > kept[1] or (kept[0] == kept[1] and ends[law.joint][0] < ends[law.joint][1]):
+            # PR2's gripper: a multiplier of -1, and limits of one sign, as if it were 1
+            note = f"its limits leave {shown(law.joint)} no room, so they are left out"
             notes.append(f"joint {shown(name)}: {note}")
             continue
         ends[law.joint] = kept

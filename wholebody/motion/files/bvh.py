@@ -19,7 +19,7 @@ from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
 from wholebody.motion.files.bvh_text import BvhText, parsed
 from wholebody.motion.files.nodes import OFF, Node, angles_about, nodes_of, postures, rotations, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
-from wholebody.motion.structure import recognised_unit
+from wholebody.motion.structure import limb_pairs, recognised_unit
 
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
@@ -36,13 +36,17 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         raise FileFormatError(f"{path.name}: all joints of the skeleton are at one place; give their offsets")
     top = 0 if ours else _moved_joint(found, parents, offsets)
     names = tuple(joint.name for joint in found.joints)
+    first = int(not ours and _begins_with_rest(angles[:, 1:]))
     if up is None:
         up = _up(names, parents, offsets, top)
         notes.append(f"{up} is up")
+        other = _other_up(up, parents, offsets, local[first:], found.positions(0)[first:])
+        if other != up:
+            notes[-1] = f"{other} is up in the motion, though {up} is in the rest posture"
+            up = other
     if unit is None:
         unit = recognised_unit(parents, offsets)
         notes.append(f"lengths are in {unit}")
-    first = int(not ours and _begins_with_rest(angles[:, 1:]))
     if first:
         notes.append("the first frame is the rest posture and no part of the motion; it is left out")
     if top:
@@ -157,6 +161,23 @@ def _up(joints: Sequence[str], parents: Indices, offsets: Array, root: int = 0) 
     return "z" if axis == 2 and way[axis] >= 0.0 else "y"
 
 
+def _other_up(up: str, parents: Indices, offsets: Array, local: Array, root: Array) -> str:
+    """The other axis where a person stands along it on the ground, as a root that is turned makes it; else `up`."""
+    pairs, other = limb_pairs(parents, offsets), "z" if up == "y" else "y"
+    if not pairs:
+        return up
+    picked, at = np.linspace(0, len(local) - 1, min(len(local), 16)).astype(np.intp), "xyz".index(other)
+    positions = SkeletonMotion.moved(
+        tuple(map(str, range(len(parents)))), parents, offsets, local[picked], root[picked], 1.0
+    ).positions
+    middles = [positions[:, [one.joints[0], another.joints[0]]].mean(axis=1) for _, one, another in pairs]
+    hips, shoulders = sorted(middles, key=lambda middle: float(middle[:, at].mean()))
+    upright = (shoulders - hips)[:, at] > 0.8 * np.linalg.norm(shoulders - hips, axis=1)
+    lowest = positions[:, :, at].min(axis=1)
+    grounded = np.abs(lowest).max() < 0.1 * longest_way(parents, offsets)
+    return other if grounded and upright.mean() > 0.5 else up
+
+
 ORDER = "ZXY"  # of rotations, as most writers of BVH have it
 MARK = "centimetres"  # before the name of a root, as a name space: an own file that would not be recognised as such
 
@@ -189,7 +210,7 @@ def write(motion: Motion, path: Path) -> Path:
 
     angles = np.degrees(_angles(back @ local @ back.T))
     moved = [k for k, node in enumerate(nodes) if node.free or not k]
-    plain = len(moved) == 1 and _recognised(nodes, scale * back, angles)
+    plain = len(moved) == 1 and _recognised(nodes, scale * back, angles, back @ local @ back.T, places[:, 0])
     add(0, "")
     lines += ["MOTION", f"Frames: {len(motion.q)}", f"Frame Time: {motion.dt:.10g}", ""]
     values = [each for k in order for each in ([scale * places[:, k] @ back.T] if k in moved else []) + [angles[:, k]]]
@@ -198,13 +219,15 @@ def write(motion: Motion, path: Path) -> Path:
     return write_file(path, "\n".join(lines) + table.getvalue())
 
 
-def _recognised(nodes: list[Node], scale: Array, angles: Array) -> bool:
+def _recognised(nodes: list[Node], scale: Array, angles: Array, local: Array, root: Array) -> bool:
     """Whether a reader recognises unit, axes and first frame of the file by itself."""
     ends = [(k, node.tip) for k, node in enumerate(nodes) if node.tip is not None]
     parents = np.array([node.parent for node in nodes] + [k for k, _ in ends], dtype=np.intp)
     offsets = np.array([node.offset for node in nodes] + [tip for _, tip in ends]) @ scale.T
     names = [node.name for node in nodes] + ["end"] * len(ends)
     known = recognised_unit(parents, offsets) == MARK and _up(names, parents, offsets) == "y"
+    still = np.tile(np.eye(3), (len(local), len(ends), 1, 1))
+    known = known and _other_up("y", parents, offsets, np.hstack([local, still]), root @ scale.T) == "y"
     return known and not _begins_with_rest(np.radians(angles[:, 1:]))
 
 
