@@ -217,8 +217,13 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """The start of the next program; the impulses of bodies that are pushed together would grow without bound."""
-        kept, count = np.flatnonzero(self._bearing() & ~self._jammed), len(self.points.gap)
+        """The start of the next program, without the impulses that would grow from step to step.
+
+        Those are of bodies that are pushed together, and of any whose motion is given: what it presses on something
+        fixed, impulses of every size balance.
+        """
+        given = self.state.bodies.given[self.points.bodies].any(axis=1)
+        kept, count = np.flatnonzero(self._bearing() & ~self._jammed & ~given), len(self.points.gap)
         return Impulses(
             self.points.pair[kept], self._local[kept], self.world_impulse()[kept], self.impulse[count:].copy(), time
         )
