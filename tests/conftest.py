@@ -331,7 +331,8 @@ def kept_browsers() -> Iterator[None]:
     """Let pictures be drawn by browsers that were started before, and small ones where no size is stated."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(screenshot, "Browser", KeptBrowser.start)
-        patch.setattr(Viewer.picture, "__defaults__", ((320, 240),))
+        for drawing in (Viewer.picture, Viewer.begin_picture):
+            patch.setattr(drawing, "__defaults__", ((320, 240),))
         os.register_at_fork(after_in_child=KeptBrowser.idle.clear)  # a browser listens to one process
         yield
     for kept in KeptBrowser.idle:

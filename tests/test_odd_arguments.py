@@ -931,7 +931,7 @@ ABSTRACT = (
 )  # fmt: skip
 """Classes to derive from, protocols, and the figure, which `load` builds."""
 
-BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]
+BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "begin_picture", "movie", "close"]
 """Methods of the viewer that need a browser or a server: see tests/view."""
 
 

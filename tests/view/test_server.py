@@ -191,3 +191,20 @@ def test_closing_ends_the_server_while_a_forked_process_holds_its_socket(exhibit
     finally:
         os.kill(forked, signal.SIGKILL)
         os.waitpid(forked, 0)
+
+
+def test_closing_in_a_forked_process_leaves_the_page_to_its_parent(exhibit: Any) -> None:
+    """A forked process that ends by `sys.exit` closes its copies of all viewers."""
+    with Viewer(exhibit) as viewer:
+        url = viewer.url
+        forked = os.fork()
+        if forked == 0:
+            code = 1
+            try:
+                viewer.close()
+                code = 0
+            finally:
+                os._exit(code)
+        assert os.waitstatus_to_exitcode(os.waitpid(forked, 0)[1]) == 0
+        assert status(url) == 200
+        assert viewer.sync(10.0)

@@ -57,11 +57,30 @@ def later(where: str) -> Measure:
     """What runs a command: a function of a module of `wholebody.cli`, such as "pose.run", imported for the call."""
 
     def measure(arguments: argparse.Namespace) -> int | None:
-        module, _, name = where.rpartition(".")
-        found: int | None = getattr(import_module(f"wholebody.cli.{module}"), name)(arguments)
+        found: int | None = _function(where)(arguments)
         return found
 
     return measure
+
+
+def later_with_pictures(where: str, draws: Callable[[argparse.Namespace], bool]) -> Measure:
+    """The same for a function that takes `Screenshots` too, whose browser starts before the imports if it draws."""
+
+    def measure(arguments: argparse.Namespace) -> int | None:
+        from wholebody.view.screenshot import Screenshots
+
+        with Screenshots() as screenshots:
+            if draws(arguments):
+                screenshots.start()
+            found: int | None = _function(where)(arguments, screenshots)
+            return found
+
+    return measure
+
+
+def _function(where: str) -> Any:
+    module, _, name = where.rpartition(".")
+    return getattr(import_module(f"wholebody.cli.{module}"), name)
 
 
 @dataclass(frozen=True)

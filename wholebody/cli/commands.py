@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.base.files import is_file
 from wholebody.cli import bench, clip
 from wholebody.cli.arguments import JOBS, JOINED, OF_WORK, add_person, scene_options
-from wholebody.cli.command import Command, Group, command, flag, later, option
+from wholebody.cli.command import Command, Group, command, flag, later, later_with_pictures, option
 from wholebody.methods import METHODS
 
 
@@ -39,7 +40,7 @@ examples:
   wholebody pose shelf.toml
   wholebody pose shelf.toml --method qp --out results/shelf
   wholebody pose shelf.toml --json | jq .joints""",
-    )(later("pose.run")),
+    )(later_with_pictures("pose.run", lambda given: not (given.no_picture or given.json) and is_file(given.task))),
     command(
         "show",
         "show a figure, a task or a result",
@@ -73,7 +74,7 @@ examples:
   wholebody show out/shelf/result.json
   wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
   wholebody show shelf.toml --save shelf.png""",
-    )(later("show.run")),
+    )(later_with_pictures("show.run", lambda given: given.save is not None and given.save.suffix.lower() == ".png")),
     command(
         "figure",
         "describe a figure, or write a person as a URDF",
@@ -101,7 +102,7 @@ You can copy and change the task file.""",
         option("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)"),
         flag("--list", "list the tasks"),
         option("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)"),
-    )(later("pose.demo")),
+    )(later_with_pictures("pose.demo", lambda given: not given.list)),
     command(
         "gallery",
         "run the example scripts, and show them on one page",

@@ -36,22 +36,15 @@ NEAR = 0.01
 _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "infeasible": "red"}
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace, screenshots: Screenshots) -> int:
     """Pose, report and write; 1 if the posture is not a solution."""
     out = arguments.out or Path("out") / arguments.task.stem
     picture = not (arguments.no_picture or arguments.json)
-    return pose(arguments.task, arguments.method, out, as_json=arguments.json, draw=picture)
-
-
-def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, draw: bool = True) -> int:
-    """Pose the figure of a task file by a method, or that of the file; write into a folder; the exit code."""
-    with Screenshots() as screenshots:
-        if draw and files.is_file(path):
-            screenshots.start()  # it gets ready while the posture is found
-        return _pose(path, method, out, as_json, screenshots if draw else None)
+    return _pose(arguments.task, arguments.method, out, arguments.json, screenshots if picture else None)
 
 
 def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots: Screenshots | None) -> int:
+    """Pose the figure of a task file by a method, or that of the file; write into a folder; the exit code."""
     chosen = None if method is None else method_named(method)
     task = read_task(path)
     files.make_folder(out)
@@ -140,7 +133,7 @@ def _measures(problem: Problem, solution: Solution) -> Table:
     return made
 
 
-def demo(arguments: argparse.Namespace) -> int:
+def demo(arguments: argparse.Namespace, screenshots: Screenshots) -> int:
     """List the tasks, or pose one."""
     tasks = task_paths()
     if arguments.list:
@@ -149,7 +142,7 @@ def demo(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.name not in tasks:
         raise UnknownNameError("demo", arguments.name, tasks)
-    code = pose(tasks[arguments.name], None, arguments.out)
+    code = _pose(tasks[arguments.name], None, arguments.out, False, screenshots)
     print(f"the task is {tasks[arguments.name]}; to turn the scene about, open {arguments.out / 'scene.html'}")
     return code
 

@@ -39,39 +39,38 @@ def draw(
     """Write scene.html and, by a browser if any, scene.png: the files, and a sentence if there is no picture."""
     with viewer_of(problem, view, title, screenshots=screenshots) as viewer:
         viewer.show(q, problem=problem)
-        written = [viewer.save(folder / "scene.html")]
-        if screenshots is None:
-            return written, ""
-        try:
-            written.append(viewer.picture(folder / "scene.png"))
-        except MissingPackageError as error:
-            return written, f"no picture: {error}"
-    return written, ""
+        picture, note = None, ""
+        if screenshots is not None:
+            try:
+                picture = viewer.begin_picture(folder / "scene.png")
+            except MissingPackageError as error:
+                note = f"no picture: {error}"
+        written = [viewer.save(folder / "scene.html")]  # while the browser draws
+        if picture is not None:
+            written.append(picture())
+    return written, note
 
 
-def run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace, screenshots: Screenshots) -> int:
     """Show, and wait until the first tab is opened and the last one is closed."""
     save: Path | None = arguments.save
     if save is not None:
         checked_target(save, "--save", "a scene", SAVED)
     if save is not None and (arguments.port or arguments.host != "127.0.0.1"):
         raise InputError("--port and --host are for the live page; leave them out beside --save")
-    with Screenshots() as screenshots:
-        if save is not None and save.suffix.lower() == ".png":
-            screenshots.start()  # it gets ready while the figure is loaded
-        problem, q, view, title = _subject(arguments.what, person_options(arguments))
-        if arguments.posture is not None:
-            q = problem.scene.figure.posture(arguments.posture)
-        served = {"host": arguments.host, "port": arguments.port, "screenshots": screenshots}
-        with viewer_of(problem, view, title, **served) as viewer:
-            viewer.show(q, problem=problem, pieces=arguments.pieces)
-            if save is None:
-                print(f"showing {title} at {viewer.url}; Ctrl-C ends it", flush=True)
-                viewer.open()
-                viewer.wait(math.inf)
-                viewer.wait_until_closed()
-            else:
-                print(f"wrote {viewer.save(save)}")
+    problem, q, view, title = _subject(arguments.what, person_options(arguments))
+    if arguments.posture is not None:
+        q = problem.scene.figure.posture(arguments.posture)
+    served = {"host": arguments.host, "port": arguments.port, "screenshots": screenshots}
+    with viewer_of(problem, view, title, **served) as viewer:
+        viewer.show(q, problem=problem, pieces=arguments.pieces)
+        if save is None:
+            print(f"showing {title} at {viewer.url}; Ctrl-C ends it", flush=True)
+            viewer.open()
+            viewer.wait(math.inf)
+            viewer.wait_until_closed()
+        else:
+            print(f"wrote {viewer.save(save)}")
     return 0
 
 

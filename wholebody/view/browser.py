@@ -11,6 +11,7 @@ import select
 import shutil
 import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -163,17 +164,34 @@ class Browser:
 
     def evaluate(self, expression: str) -> Any:
         """Value of a JavaScript expression in the page; promises are awaited. Raises BrowserError where it throws."""
-        answer = self._call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
-        if "exceptionDetails" in answer:
-            raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
-        return answer["result"].get("value")
+        return self._begin(expression)()
+
+    def _begin(self, expression: str) -> Callable[[], Any]:
+        """Let the page find the value of a JavaScript expression; the function that is returned waits for it."""
+        if self._session is None:
+            self._attach()
+        number = self._send(
+            "Runtime.evaluate", self._session, expression=expression, returnByValue=True, awaitPromise=True
+        )
+
+        def value() -> Any:
+            answer = self._answer("Runtime.evaluate", number)
+            if "exceptionDetails" in answer:
+                raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
+            return answer["result"].get("value")
+
+        return value
 
     def capture(self, first: str = "0", *, legend: bool = False) -> bytes:
         """PNG of the drawing without controls, after JavaScript that comes first; with the panel in a corner or not."""
+        return self.capturing(first, legend=legend)()
+
+    def capturing(self, first: str = "0", *, legend: bool = False) -> Callable[[], bytes]:
+        """Begin to `capture`, and return the function that waits for the PNG."""
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
-        data: str = self.evaluate(f"{first}; wholebody.capture({json.dumps(legend)})")
-        return base64.b64decode(data.partition(",")[2])
+        data = self._begin(f"{first}; wholebody.capture({json.dumps(legend)})")
+        return lambda: base64.b64decode(data().partition(",")[2])
 
     def close(self) -> None:
         """End Chromium and remove its temporary files. Calling it again does nothing."""
@@ -210,6 +228,10 @@ class Browser:
         return self._ask(method, self._session, **params)
 
     def _ask(self, method: str, session: str | None, **params: Any) -> dict[str, Any]:
+        return self._answer(method, self._send(method, session, **params))
+
+    def _send(self, method: str, session: str | None, **params: Any) -> int:
+        """Send a message; its number."""
         self._number += 1
         message: dict[str, Any] = {"id": self._number, "method": method, "params": params}
         if session is not None:
@@ -220,10 +242,14 @@ class Browser:
                 rest = rest[os.write(self._out, rest) :]
         except OSError:
             raise self._gone() from None
+        return self._number
+
+    def _answer(self, method: str, number: int) -> dict[str, Any]:
+        """Wait for the answer to a message."""
         end = time.monotonic() + self.timeout
-        while self._number not in self._answers:
+        while number not in self._answers:
             self._receive(end)
-        answer = self._answers.pop(self._number)
+        answer = self._answers.pop(number)
         if "error" in answer:
             raise BrowserError(f"the browser refused {method}: {answer['error'].get('message')}")
         result: dict[str, Any] = answer["result"]

@@ -73,9 +73,12 @@ class Screenshots:
         with suppress(MissingPackageError):
             self._started()
 
-    def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> bytes:
-        """PNG of what commands draw in an empty page, of this width and height; with the panel if wanted."""
-        return self._draw(wanted, size).capture(legend=legend)
+    def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> Callable[[], bytes]:
+        """Begin to draw commands in an empty page of this width and height, with the panel if wanted.
+
+        The function that is returned waits for the PNG, and comes before the next picture.
+        """
+        return self._draw(wanted, size).capturing(legend=legend)
 
     def pictures(self, wanted: Sequence[Command], size: Any, times: Iterable[float]) -> Iterator[bytes]:
         """PNGs at these times of a motion, seconds; raises like `picture`, before the first."""

@@ -246,9 +246,9 @@ class Server:
         return done.wait(timeout)
 
     def close(self) -> None:
-        """End the thread. Calling it again does nothing."""
+        """End the thread. Calling it again, or in a forked process, does nothing."""
         atexit.unregister(self.close)
-        if not self._loop.is_closed():
+        if self._thread.is_alive():  # a forked process has no thread, and the loop's sockets are its parent's
             self._loop.call_soon_threadsafe(self._stopped.set)
             self._thread.join()
             self._loop.close()

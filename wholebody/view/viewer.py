@@ -327,10 +327,17 @@ class Viewer:
             InputError: nothing is shown yet, the size is out of range, or the file is no .png or cannot be written.
             MissingPackageError: there is no Chromium.
         """
+        return self.begin_picture(path, size, legend=legend)()
+
+    def begin_picture(
+        self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720), *, legend: bool = True
+    ) -> Callable[[], Path]:
+        """Begin a `picture`, and return the function that waits for Chromium, writes it and returns the path."""
         legend = checks.flag(legend, "legend")
         place = checked_target(path, "picture: path", "a picture", (".png",))
         wanted = [command for command in self._commands() if command.op != Op.ANIMATION]
-        return write(place, self._screenshots.picture(wanted, size, legend=legend))
+        drawn = self._screenshots.picture(wanted, size, legend=legend)
+        return lambda: write(place, drawn())
 
     def movie(
         self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None, *,
