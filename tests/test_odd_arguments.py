@@ -634,7 +634,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.joined", Call(clip.joined, {"other": clip})
     pair_of = wb.Scene({"one": arm, "two": arm}).figure
     yield "Clip.part", Call(wb.Clip(pair_of, [pair_of.neutral], 0.1).part, {"name": "two"})
-    yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
+    yield "Clip.with_q", Call(clip.with_q, {"q": [q]})
     yield "Clip.plot", Call(clip.plot, {"joints": arm.joints[:2]})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations"):
@@ -674,8 +674,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     local = {**moving_skeleton, "local": np.tile(np.eye(3), (3, 2, 1, 1)), "root": np.zeros((3, 3))}
     del local["rotations"], local["positions"]
     yield "SkeletonMotion.moved", Call(wb.motion.SkeletonMotion.moved, local)
-    for method in ("rest", "reversed", "length"):
-        yield f"SkeletonMotion.{method}", Call(getattr(skeleton, method), {})
+    yield "SkeletonMotion.rest", Call(skeleton.rest, {})
     bones = {
         "skeleton": {"left_wrist": "a", "left_elbow": "b"},
         "figure": {"left_wrist": "link4", "left_elbow": "link2"},

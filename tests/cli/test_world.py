@@ -101,7 +101,7 @@ def test_a_door_of_a_task_file_swings_on_its_hinge_while_a_ball_falls(tmp_path: 
     [
         ('joints = [{ type = "hinge", to = "wal" }]', "did you mean wall"),
         ('joints = [{ type = "hinge", to = "door" }]', "the thing cannot hold itself"),
-        ('joints = [{ type = "slider" }]', '"hinge" or "ball"'),
+        ('joints = [{ type = "slider" }]', "'hinge' or 'ball'"),
         ('joints = [{ type = "ball", axis = [0, 0, 1] }]', "no key is called 'axis'; known: at"),
         ('joints = [{ type = "hinge", axis = [0, 0, 0] }]', "has no direction; give a vector"),
         ('joints = { type = "hinge" }', "is no list of joints"),

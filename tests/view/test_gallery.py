@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.cli import main
-from wholebody.figures import packaged_urdf
+from wholebody.cli import main, pose
 from wholebody.view.browser import Browser
 from wholebody.view.gallery import write_gallery
 
@@ -39,7 +38,7 @@ def test_each_script_is_run_and_told(scripts: list[Path], tmp_path: Path, monkey
     page = (tmp_path / "gallery.html").read_text()
     assert "A &lt;small&gt; story." in page
     assert 'src="http' not in page
-    monkeypatch.setattr(packaged_urdf, "script_paths", lambda: {path.stem: path for path in scripts})
+    monkeypatch.setattr(pose, "script_paths", lambda: {path.stem: path for path in scripts})
     assert main(["gallery", "bad", "--out", str(tmp_path / "other.html")]) == 1
     assert main(["gallery", "worse", "--out", str(tmp_path / "other.html")]) == 2
 

@@ -289,7 +289,10 @@ def sampled(
         How many there are.
     """
     (lower, upper), near, values = limits, nearest.copy(), np.zeros(len(found))
-    if not (nearest[1] > 0.0).any():
+    weighed = False
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
+    if not weighed:
         near[1] = 1.0
     if arm.held >= 0:
         joint = arm.joints[arm.held]
