@@ -21,6 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, cross
+from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.figure_points import Moved, Points, axes_of
@@ -78,7 +79,7 @@ class Articulated:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
         now, left, self.impulses, self.frames, self.ends = 0.0, dt, {}, [], []
-        while left > 1e-9 * dt:
+        while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, STEP)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
             aim = np.asarray(pin.integrate(self._model, self._tracked, steady * now))
@@ -162,7 +163,7 @@ class Articulated:
             return time, None
         held = {name for name, c, *_ in points.pushes if bearing[c].any()}
         energy = engine.energy()
-        frame = engine.advance(time, motions, held)
+        frame = engine.advance(time, motions, held, segments)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
         given = self._left_for_later(frame, segments, energy) if time <= SHORTEST else frame.wrenches
         self._react(given, twists, segments)

@@ -42,7 +42,9 @@ def _kinetic(b: int, bodies: Bodies, rotation: Array, twist: Array, turning: Arr
 
 
 @compiled(inner=True)
-def _islands(points: Indices, impulse: Array, contacts: int, bodies: Bodies) -> tuple[Indices, Indices, Mask]:
+def _islands(
+    points: Indices, impulse: Array, contacts: int, bodies: Bodies, movable: Mask
+) -> tuple[Indices, Indices, Mask]:
     """The island (n,) of each body, what that touches, and which bodies a contact pushes; see `restrain`."""
     count = len(bodies.mass)
     root, kind = np.empty(count, dtype=np.intp), np.full(count, FREE, dtype=np.intp)
@@ -56,7 +58,7 @@ def _islands(points: Indices, impulse: Array, contacts: int, bodies: Bodies) -> 
         if c < contacts:
             for side in range(2):
                 pushed[points[c, side]] = moving[points[c, side]]
-    join(bearing[:number], points, moving, root)
+    join(bearing[:number], points, movable, root)  # what yields passes energy from one body to another
     for c in bearing[:number]:
         for side in range(2):
             own, other = points[c, side], points[c, 1 - side]
@@ -75,7 +77,14 @@ def _owner(points: Indices, c: int, bodies: Bodies, root: Indices) -> int:
 
 @compiled()
 def restrain(
-    points: Indices, impulse: Array, off: Mask, bodies: Bodies, before: Array, fall: Array, jammed: Mask
+    points: Indices,
+    impulse: Array,
+    off: Mask,
+    bodies: Bodies,
+    movable: Mask,
+    before: Array,
+    fall: Array,
+    jammed: Mask,
 ) -> None:
     """Scale velocities down where an island gained energy, and write which points are jammed.
 
@@ -86,12 +95,13 @@ def restrain(
         impulse: (m, 3) of the program.
         off: (k,) contact points whose rates the program did not reach.
         bodies: after the program; their velocities are changed in place.
+        movable: (n,) bodies that the program moves: those that move by themselves, and what yields.
         before: (n, 6) velocities before the step.
         fall: (3,) gravity times the time of the step, m/s.
         jammed: (k,) room: contact points that bear something of islands that something moved pushes, where a rate is
             off.
     """
-    root, kind, pushed = _islands(points, impulse, len(off), bodies)
+    root, kind, pushed = _islands(points, impulse, len(off), bodies, movable)
     _find_jammed(points, impulse, off, bodies, root, kind, jammed)
     count, twist = len(root), bodies.twist
     for b in range(count):
@@ -119,12 +129,13 @@ def settle(
     work: Array,
     contacts: int,
     bodies: Bodies,
+    movable: Mask,
     before: tuple[Array, Array, Array],
     gravity: Array,
 ) -> None:
     """Scale velocities of islands with joints, or pushed, to the energy before the step and the work (m,) on them."""
     # The first `contacts` points are contacts; `before` are positions, rotations and velocities.
-    root, kind, pushed = _islands(points, impulse, contacts, bodies)
+    root, kind, pushed = _islands(points, impulse, contacts, bodies, movable)
     count, moving = len(root), bodies.moving
     linked, touched = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     gain, turning = np.zeros(count), np.empty(3)

@@ -182,7 +182,11 @@ class RigidBodies:
         return self._pieces.index[checks.known(name, self._pieces.index, "body")]
 
     def advance(
-        self, dt: float, kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None, borne: Collection[str] = ()
+        self,
+        dt: float,
+        kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None,
+        borne: Collection[str] = (),
+        yielding: Collection[str] = (),
     ) -> EngineFrame:
         """Advance by a frame.
 
@@ -191,6 +195,8 @@ class RigidBodies:
             kinematic: name of a segment, or of a thing without a body, to its placements at the start and at the end of
                 the frame, between which it moves with constant velocity and angular velocity. What is not named stands.
             borne: bodies that pushes given before bear during the frame: they move with their velocity at its end.
+            yielding: segments whose motion is that of a figure to which their impulses are given after the frame. To
+                contacts they weigh what their joints carry; others of `kinematic` are as heavy as anything.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
         state, given = self.state, {self._number(name): pair for name, pair in given_placements(kinematic).items()}
@@ -201,6 +207,7 @@ class RigidBodies:
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
         self._borne = np.isin(self.names, list(borne))
+        self._yielding = np.isin(self.names, list(yielding)) & np.isfinite(self._pieces.mass)
         count = int(np.ceil(dt / STEP - 1e-9))
         # early ends of steps: eight for a dozen bodies, as each costs a step of all of them
         stops = 96 // max(12, int(state.bodies.moving.sum()))
@@ -246,7 +253,7 @@ class RigidBodies:
         state = self.state
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
-        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
+        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, self._yielding)
         events, ended = program.resolve_impacts(np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0]))
         self._record(events, program, record)
         falling = self._falling & ~self._borne
@@ -369,7 +376,8 @@ class RigidBodies:
         state = self.state
         before, position = self.energy(), state.bodies.position.copy()
         for _ in range(4):
-            program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
+            still = np.zeros_like(self._yielding)
+            program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, still)
             motion_kernel.displace(state.bodies, program.separation(0.5 * SKIN))
             least = self._find_near(STEP)
             if least >= LEAST_GAP:

@@ -60,12 +60,16 @@ class StepProgram:
         residuals: Signorini's and Coulomb's, m/s.
     """
 
-    def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints) -> None:
+    def __init__(
+        self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints, yielding: Mask
+    ) -> None:
+        """`yielding` (n,): bodies whose motion is given and that the program takes to have their masses."""
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
+        self._yielding = yielding
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
-        self._rows = self._point_rows(state.bodies.moving)
+        self._rows = self._point_rows(state.bodies.moving | yielding)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
         self._jammed = np.zeros(len(points.gap), dtype=bool)
@@ -102,7 +106,7 @@ class StepProgram:
 
     def add_points(self, points: ContactPoints, time: float) -> None:
         """Add contact points at the end of a step of this time, with gaps that lead there with its velocities."""
-        late = StepProgram(self.state, points, self.gravity, self.joints)
+        late = StepProgram(self.state, points, self.gravity, self.joints, self._yielding)
         late.read_velocities(~self.pushed())
         gap = points.gap - time * late.speed + 0.5 * late._pull * time**2
         count, own, rows = len(self.points.gap), late._rows, self._rows
@@ -180,7 +184,8 @@ class StepProgram:
         """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
         bodies, points = self.state.bodies, self._rows.bodies
         off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > 1.2e-4  # m/s: a program is solved to 1e-4
-        energy_kernel.restrain(points, self.impulse, off, bodies, began, time * self.gravity, self._jammed)
+        fall, movable = time * self.gravity, self._rows.movable
+        energy_kernel.restrain(points, self.impulse, off, bodies, movable, began, fall, self._jammed)
 
     def work(self) -> Array:
         """Work that bodies whose motion is given did at each point (m + j,) by the impulses of the program, joules."""
@@ -195,16 +200,20 @@ class StepProgram:
         bodies, points = self.state.bodies, self.points
         if len(self.joints) or bodies.given[points.bodies[self._bearing()]].any():
             energy_kernel.settle(
-                self._rows.bodies, self.impulse, work, len(points.gap), bodies, before, np.array(self.gravity)
+                self._rows.bodies, self.impulse, work, len(points.gap), bodies, self._rows.movable, before,
+                np.array(self.gravity),
             )
 
     def _solve(self, target: Array, start: Impulses, hold: Array) -> None:
         old, new = (start.pair, start.local, start.impulse), (self.points.pair, self._local)
+        twist, moving = self.state.bodies.twist, self.state.bodies.moving
+        given = twist[~moving]
         self.impulse[len(target) :] = start.joint
         self.residuals = solve_kernel.solve_from(
-            old, new, self._rows, Laws(self._friction, target, hold), self.state.bodies.twist, self.impulse,
+            old, new, self._rows, Laws(self._friction, target, hold), twist, self.impulse,
             self._limits(1e-4),  # m/s: 0.4 um of the way of a step
         )  # fmt: skip
+        twist[~moving] = given
 
     def world_impulse(self) -> Array:
         """Impulses (m, 3) of the contacts on the second bodies, along the world's axes, N s."""
@@ -275,8 +284,8 @@ def compiled_kernel(_: Any) -> None:
     solve_kernel.residuals(rows, laws, twist, vectors)
     solve_kernel.join(none, pairs, mask, _integers(1))
     solve_kernel.solve_from((none, vectors, vectors), (none, vectors), rows, laws, twist, vectors, Limits(1.0, 1))
-    energy_kernel.restrain(pairs, vectors, no_mask, bodies, twist, np.zeros(3), no_mask)
-    energy_kernel.settle(pairs, vectors, some, 0, bodies, (one, unit, twist), np.zeros(3))
+    energy_kernel.restrain(pairs, vectors, no_mask, bodies, mask, twist, np.zeros(3), no_mask)
+    energy_kernel.settle(pairs, vectors, some, 0, bodies, mask, (one, unit, twist), np.zeros(3))
     impact_kernel.resolve(none, none, rows, some, laws, mask, twist, np.zeros((1, 5)))
     swept = SweptPoints(vectors, none, none, some, vectors, np.zeros((0, 4)))
     way = passing.Way(pairs, none, np.zeros((2, 0)), np.zeros((2, 0, 3)), np.zeros((2, 0, 4, 3)), one, some, some, 0.0)
