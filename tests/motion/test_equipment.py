@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.geometry.compound import Compound
 from wholebody.motion.worn_equipment import READY, Equipment, bounds, equipment, group_of
 
 
@@ -113,3 +116,9 @@ def test_bounds_of_a_mesh_are_those_of_its_vertices() -> None:
     low, high = bounds(mesh)
     assert np.allclose(low, 0.0, atol=1e-9)
     assert np.allclose(high, (0.3, 0.2, 0.1), atol=1e-9)
+
+
+def test_what_has_no_end_has_no_bounds() -> None:
+    for endless in (wb.HalfSpace(), Compound(((wb.HalfSpace(), pin.SE3.Identity()),))):
+        with pytest.raises(InputError, match="has no bounds"):
+            bounds(endless)

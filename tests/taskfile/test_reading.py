@@ -48,6 +48,10 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ("clearance = 0.01", "clearance = 10", ["task.toml:1", "key clearance", "between 0 and 0.5 m"]),
         ("clearance = 0.01", "clearance = nan", ["task.toml:1", "key clearance", "nan"]),
         ("radius = 0.01", "radius = true", ["attach 1, key radius", "is True; give a number"]),
+        # what is asked for is written as a file has it
+        ("clearance = 0.01", 'balance = "yes"', ["key balance is 'yes'; give true or false, without quotes"]),
+        ('name = "qp"', 'name = "qp"\ntime_limit = -1', ["or inf for no limit"]),
+        ("radius = 0.01", "radius = 0.01\ncolor = [1, 2, 3]", ["such as [1.0, 0.0, 0.0]"]),
         ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "write 1.75 if it is in centimetres"]),
         ('detail = "spheres"', "proportions = { siting_height = 0.9 }", ["sitting_height"]),
         (

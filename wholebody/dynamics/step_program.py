@@ -200,7 +200,13 @@ class StepProgram:
         bodies, points = self.state.bodies, self.points
         if len(self.joints) or bodies.given[points.bodies[self._bearing()]].any():
             energy_kernel.settle(
-                self._rows.bodies, self.impulse, work, len(points.gap), bodies, self._rows.movable, before,
+                self._rows.bodies,
+                self.impulse,
+                work,
+                len(points.gap),
+                bodies,
+                self._rows.movable,
+                before,
                 np.array(self.gravity),
             )
 

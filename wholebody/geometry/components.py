@@ -245,9 +245,9 @@ def _wound_alike(faces: NDArray[np.int64]) -> NDArray[np.int64]:
             beside.setdefault(tuple(sorted(edge)), []).append(number)
     turned: NDArray[np.int64] = faces.copy()
     left = set(range(len(faces)))
-    while left:
-        queue = [min(left)]
-        left.remove(queue[0])
+    for start in range(len(faces)):
+        queue = [start] if start in left else []
+        left.discard(start)
         while queue:
             face = turned[queue.pop()].tolist()
             for edge in zip(face, face[1:] + face[:1], strict=True):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, get_args
 
+import coal
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +18,7 @@ from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
 from wholebody.figures.postures import support
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.geometry.shapes import Box, HalfSpace, Mesh, Shape, Sphere
+from wholebody.geometry.shapes import Box, Mesh, Shape, Sphere
 from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
 from wholebody.scene.scene import Scene
 
@@ -161,9 +162,9 @@ def group_of(figure: Figure, segment: str) -> tuple[str, ...]:
 
 def bounds(shape: Shape) -> tuple[Array, Array]:
     """Least and greatest corner (3,) of a shape's bounding box, metres; `InputError` for a half-space."""
-    if isinstance(shape, HalfSpace):
-        raise InputError("a HalfSpace has no bounds; equipment is a solid of finite size")
     axes, pieces = np.vstack([np.eye(3), -np.eye(3)]), shape.pieces()
+    if any(isinstance(piece.geometry, coal.Halfspace) for piece in pieces):
+        raise InputError(f"a {type(shape).__name__} has no bounds; equipment is a solid of finite size")
     most = np.array([max(support(piece.geometry, piece.placement, axis) for piece in pieces) for axis in axes])
     return -most[3:], most[:3]
 

@@ -40,6 +40,10 @@ class Nameless:
         """Check nothing."""
 
 
+_IN_TOML = {"True or False": "true or false, without quotes", "math.inf": "inf", "(1.0, 0.0, 0.0)": "[1.0, 0.0, 0.0]"}
+"""How a file has what checks ask for in Python."""
+
+
 @dataclass(frozen=True)
 class Value(Nameless):
     """What a check accepts, as it is in Python."""
@@ -52,7 +56,10 @@ class Value(Nameless):
         try:
             return self.check(value, "")
         except InputError as error:
-            raise FileFormatError(f"{where}{error}") from None
+            said = str(error)
+            for python, toml in _IN_TOML.items():
+                said = said.replace(python, toml)
+            raise FileFormatError(f"{where}{said}") from None
 
 
 def _text(value: object, what: str) -> str:

@@ -348,4 +348,5 @@ class Server:
                 hub.changed()
                 hub.settle()
 
-        return Application([("/", Page), ("/socket", Tab)])
+        # the program's own standard error has no place for requests that are refused
+        return Application([("/", Page), ("/socket", Tab)], log_function=lambda handler: None)

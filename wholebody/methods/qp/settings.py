@@ -129,9 +129,7 @@ class NearestNumbers(NamedTuple):
     radius: float = 0.5  # rad, m: trust region of the first step
     largest_radius: float = 1.0  # and of any. Larger: fewer programs, more rejected ones.
     held: float = 1e-2  # m, rad: holds missed by more than this do not bend; what they pull with says nothing yet
-    flat: float = (
-        1e-3  # share of the violation that a step is to gain, or it is at rest. Smaller: nearer, more programs.
-    )
+    flat: float = 1e-3  # share of the violation that a step is to gain, or it is at rest. Smaller: more programs.
     nearly_flat: float = 1e-2  # the same where only the size of the residual counts
     # share of the largest curvature that every direction has at least. Less: active sets that go in circles, dearer
     # programs; more: shorter steps, ends farther off (at 0.2 by centimetres).
@@ -172,9 +170,7 @@ class SearchNumbers(NamedTuple):
     lower: float = 0.9995  # share of a contact's measures below which those at its place are another minimum
     moved: float = 0.99  # share below which they are looked for again, at the place of that minimum. More: slower.
     poor: int = 2  # starts for the measures where it is none after all. More: lower, slower.
-    dear: float = (
-        2.0  # times the measures through everything above which a lower minimum is sought. Less: lower, slower.
-    )
+    dear: float = 2.0  # times the measures through everything above which a lower minimum is sought. Less: slower.
     screened: int = 4  # feasible postures that are looked for, for each descended from. More: lower measures, slower.
 
 
@@ -192,9 +188,7 @@ class StepNumbers(NamedTuple):
     # m rad: change of a step's motion times its turn above which it is looked at how it curves what is held. Larger:
     # feet off by micrometres after jumps; smaller: more looks.
     bent: float = 5e-5
-    straight: float = (
-        1.5e-6  # m, rad by which what is held may be curved otherwise than predicted. Less: more programs.
-    )
+    straight: float = 1.5e-6  # m, rad by which holds may be curved otherwise than predicted. Less: more programs.
     traded: float = 0.5  # see `StepProgram.solve`: greater = weights count in more steps, and light goals wait in more.
     again: int = 2  # times that a program is solved again at most. More: smoother at obstacles, dearer steps there.
 
@@ -219,9 +213,7 @@ class TrackingNumbers(NamedTuple):
     room: float = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
     off: float = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
     unseen: float = 1e-4  # m: by which turning may bring things nearer than rows say without being looked after
-    inside: float = (
-        5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy, so that none ends inside
-    )
+    inside: float = 5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy: none ends inside
 
 
 class EscapeNumbers(NamedTuple):
