@@ -231,9 +231,8 @@ def test_frames_without_room_are_told_and_their_programs_stay_small(
     check = wb.check(clip, low)
     assert (check.depth > 2e-3).all()
     assert any(f"by {1e3 * check.deepest:.0f} mm" in str(one.message) for one in told)
-    assert max(rows) < len(
-        low.geometry.collisionPairs
-    )  # those of ways between frames that both overlap came to ten times as many
+    # those of ways between frames that both overlap came to ten times as many
+    assert max(rows) < len(low.geometry.collisionPairs)
 
 
 def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -> None:
