@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.geometry.pair_distances import SinglePairs
 from wholebody.geometry.proximity import Contacts, PairTable
 
@@ -56,7 +56,7 @@ def near_among(
     for one, other in left_out:
         kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
     chosen = pieces[pairs[kept]]
-    chosen = chosen[~np.isinf(table.reach[chosen]).all(axis=1)]
+    chosen = chosen[_beyond_no_face(table, placements, chosen, within)]
     found = SinglePairs(table.geometry).measured(placements, chosen)
     # coal has no normal where two centres meet: any parts them as well
     found[~(np.linalg.norm(found[:, 1:4], axis=1) > 0.5), 1:4] = (0.0, 0.0, 1.0)
@@ -65,3 +65,19 @@ def near_among(
     number = np.full(len(near), -1, dtype=np.intp)
     distance, normal, point_a, point_b = (np.ascontiguousarray(part) for part in np.split(found, (1, 4, 7), axis=1))
     return Contacts(chosen, distance[:, 0], normal, point_a, point_b, number, placements).nearest_first()
+
+
+def _beyond_no_face(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
+    """Whether no box of pairs (k, 2) is farther than `within` from a half-space; False for two half-spaces.
+
+    Half-spaces are beside everything in boxes along the axes of the world: each would be measured with all pieces.
+    """
+    endless = np.isinf(table.reach[pairs])
+    kept = ~endless.all(axis=1)
+    for plane in np.unique(pairs[endless]).tolist():
+        rows = np.flatnonzero((pairs == plane).any(axis=1) & kept)
+        other = pairs[rows].sum(axis=1) - plane
+        normal = table.swept[plane].faces[0, :3] @ placements[plane, :3]
+        height = (placements[other, 3] - placements[plane, 3]) @ normal - table.swept[plane].faces[0, 3]
+        kept[rows] = height - (np.abs(placements[other, :3] @ normal) * table.half[other]).sum(axis=1) < within
+    return np.asarray(kept)
