@@ -199,15 +199,9 @@ class StepProgram:
         """Scale velocities after a step of this work (m + j,), so that joints and what is moved add no energy."""
         bodies, points = self.state.bodies, self.points
         if len(self.joints) or bodies.given[points.bodies[self._bearing()]].any():
+            rows = self._rows
             energy_kernel.settle(
-                self._rows.bodies,
-                self.impulse,
-                work,
-                len(points.gap),
-                bodies,
-                self._rows.movable,
-                before,
-                np.array(self.gravity),
+                rows.bodies, self.impulse, work, len(points.gap), bodies, rows.movable, before, np.array(self.gravity)
             )
 
     def _solve(self, target: Array, start: Impulses, hold: Array) -> None:
@@ -232,13 +226,12 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """The start of the next program, without the impulses that would grow from step to step.
+        """The start of the next program, without impulses that would grow without bound.
 
-        Those are of bodies that are pushed together, and of any whose motion is given: what it presses on something
-        fixed, impulses of every size balance.
+        Those are of bodies that are pushed together, and of what yields: its motion changes by them after the step.
         """
-        given = self.state.bodies.given[self.points.bodies].any(axis=1)
-        kept, count = np.flatnonzero(self._bearing() & ~self._jammed & ~given), len(self.points.gap)
+        grow = self._jammed | self._yielding[self.points.bodies].any(axis=1)
+        kept, count = np.flatnonzero(self._bearing() & ~grow), len(self.points.gap)
         return Impulses(
             self.points.pair[kept], self._local[kept], self.world_impulse()[kept], self.impulse[count:].copy(), time
         )

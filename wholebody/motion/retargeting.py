@@ -81,8 +81,8 @@ def retarget(
         where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
         touch it at the same place, and go with it; hands that meet do so. In every frame the figure is free of itself,
         of the ground and of things where the holds and limits leave room for it; between frames too, as seen at some
-        places of each motion, unless things move. What `wb.check` tells of either, `wb.avoid` mends. With `ground=None`
-        and no scene the figure may collide.
+        places of each motion, unless things move. Frames that overlap by 2 mm or more are told. What `wb.check` tells
+        of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
 
     Raises:
         UnknownNameError: a name that does not exist.

@@ -71,10 +71,10 @@ examples:
             "skeletons' motions for a figure",
             """\
 Turn the motion of a skeleton (BVH, glTF, AMASS) into a clip of a figure of any proportions. Limbs keep the recorded
-directions, within joint limits, speed limits and reach cones. Points that rest are held on the ground, and no frame
-overlaps itself or the floor. A table has the errors of bones; `wholebody clip check` tests the motion between frames. A
-robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a folder; those that
-it holds are not made again.""",
+directions, within joint limits, speed limits and reach cones. Points that rest are held on the ground, and frames
+that overlap themselves or the floor are told. A table has the errors of bones; `wholebody clip check` tests the motion
+between frames. A robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a
+folder; those that it holds are not made again.""",
             *MOTIONS,
             option("--to", metavar="FIGURE", help="another name of --figure; a robot goes about freely"),
             option(
