@@ -377,7 +377,8 @@ class Problem(checks.FixedAttributes):
         built = self.scene.built
         if self.clearance == 0.0:  # which no pair has less than
             return np.zeros(len(built.table.pairs))
-        asked = np.full(len(built.table.pairs), self.clearance)
+        asked = np.empty(len(built.table.pairs))
+        asked.fill(self.clearance)
         brought = [pair for term in (*goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
