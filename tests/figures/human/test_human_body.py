@@ -228,13 +228,12 @@ def test_spheres_cover_the_pieces_as_far_as_the_page_says(case):
 @pytest.mark.parametrize("detail", ["capsules", "hulls", "spheres"])
 @pytest.mark.parametrize("who", [{"sex": "female"}, {"sex": "male"}, {"stature": 1.65, "mass": 110.0}])
 def test_named_postures_of_who_is_dressed_are_free(who, detail):
-    for clothing in (0.02, 0.03):
-        scene = wb.Scene(load("human", clothing=clothing, detail=detail, **who))
-        for name in scene.figure.postures:
-            q = scene.figure.posture(name)
-            assert len(scene.contacts(q, within=0.0).pair) == 0, (clothing, name)
-            if name in ("squatting", "sitting"):
-                assert scene.figure.placement(q, "left_sole").rotation[2, 2] > 0.9, (clothing, name)
+    scene = wb.Scene(load("human", clothing=0.03, detail=detail, **who))
+    for name in scene.figure.postures:
+        q = scene.figure.posture(name)
+        assert len(scene.contacts(q, within=0.0).pair) == 0, name
+        if name in ("squatting", "sitting"):
+            assert scene.figure.placement(q, "left_sole").rotation[2, 2] > 0.9, name
     assert not scene.figure.notes
     assert "overlap" in load("human", clothing=0.05, **who).notes[0]
 
