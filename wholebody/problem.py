@@ -161,11 +161,13 @@ class Problem(checks.FixedAttributes):
         """Attributes that follow from the terms that were stated, with these resolved goals."""
         stated, measured, joined = self.stated, self.measures is self._usual, self.constraints is self._joined
         make = partial(self._usual_terms, stated, goals, measured, joined)
-        if self.bounds or any(map(is_own, (*stated, *goals))):  # which may change
+        told = tuple(map(seen, goals))
+        # own terms may change, and others are not told from those of another statement
+        if self.bounds or any(map(is_, told, goals)) or any(map(is_own, (*stated, *goals))):
             measures, (defaults, left_out) = make()
         else:
             asked = measured, joined, self.range_of_motion, self.balance
-            key = "defaults", asked, stated, tuple(map(seen, goals)), self._rest.tobytes()
+            key = "defaults", asked, stated, told, self._rest.tobytes()
             measures, (defaults, left_out) = once(self.scene, key, make)
         found: dict[str, Any] = {"goals": goals, "_known": goals}
         if measured:
