@@ -46,7 +46,7 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
     assert (packed.equipment, packed.file) == ("pack", "an_arm-pack-bisection.npz")
     assert [row["file"] for row in csv.DictReader((tmp_path / SHEET).open())] == [first.file, packed.file]
     rows = (json.loads(line)[1] for line in (tmp_path / TABLE).read_text().splitlines()[1:])
-    assert [row["bisection"] for row in rows] == [len(clip)] * 2
+    assert [row["frames"] for row in rows] == [len(clip)] * 2
     (tmp_path / first.file).unlink()
     told.clear()
     run("nothing", "pack")

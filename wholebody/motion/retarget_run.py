@@ -101,7 +101,6 @@ class Run:
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
         self._held = dict[int, tuple[int, tuple[Array, Array]]]()
         self._dips = dict[int, list[float]]()  # shares of the motion to a frame at which something overlaps
-        self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
         self._stages: list[tuple[Callable[[int], None], int]] = [
@@ -139,14 +138,6 @@ class Run:
         self._wanted[self._came] = wanted
         self._came += 1
         return self._advanced()
-
-    def led_by(self, frames: list[Wanted]) -> None:
-        """Know frames before they come: fitted backward in time too, these may have better postures."""
-        following: tuple[Array, float] | None = None
-        for k in range(len(frames) - 1, -1, -1):
-            self._wanted[k] = frames[k]
-            following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % self.every == 0)
-            self._backward[k] = following
 
     def finish(self) -> list[Array]:
         """The postures (nq,) of the last frames."""
@@ -193,11 +184,7 @@ class Run:
     def _fit(self, k: int) -> None:
         """The free posture of a frame, from that before."""
         near = self._chain[k - 1][0] if k else None
-        best = self._fitted(k, near, k % self.every == 0)
-        other = self._backward.pop(k, None)
-        if other is not None and other[1] < WORTH * best[1]:
-            best = other
-        self._chain[k] = best
+        self._chain[k] = self._fitted(k, near, k % self.every == 0)
 
     def _slowed(self, k: int) -> None:
         """The free posture within speed limits: the middle between what keeps to them forward and backward in time."""
