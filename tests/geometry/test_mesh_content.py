@@ -39,6 +39,16 @@ def test_a_cut_stl_is_refused(tmp_path: Path) -> None:
         wb.Mesh(tmp_path / "ball.stl")
 
 
+def test_an_stl_in_capitals_and_one_with_more_at_its_end_are_read(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(1)
+    (tmp_path / "capitals.stl").write_text(str(ball.export(file_type="stl_ascii")).upper())
+    (tmp_path / "longer.stl").write_bytes(ball.export(file_type="stl") + b"made by nobody" * 9)
+    for name in ("capitals", "longer"):
+        mesh = wb.Mesh(tmp_path / f"{name}.stl")
+        assert len(mesh.faces) == 80
+        assert np.ptp(mesh.vertices, axis=0) == pytest.approx(np.ptp(ball.vertices, axis=0), abs=1e-6)
+
+
 def test_ply_is_read_and_gltf_is_y_up(tmp_path: Path) -> None:
     box = trimesh.creation.box((1.0, 2.0, 3.0))
     for suffix in ("ply", "glb"):
