@@ -55,9 +55,7 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
 
 def test_another_clip_of_the_name_or_other_settings_are_done_anew(clip: wb.Clip, tmp_path: Path) -> None:
     (first,) = wb.motion.avoid_many([clip], tmp_path, methods=["bisection"])
-    kept = wb.motion.avoid_many(
-        [clip[1:]], tmp_path, methods=[wb.motion.Bisection(), wb.motion.Bisection(room=0.02)]
-    )
+    kept = wb.motion.avoid_many([clip[1:]], tmp_path, methods=[wb.motion.Bisection(), wb.motion.Bisection(room=0.02)])
     assert [row.method for row in kept] == ["bisection", "bisection 2"]
     assert kept[0].frames == first.frames - 1
     assert kept[1].angle > kept[0].angle

@@ -93,14 +93,15 @@ class Run:
         self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
         self.span = 2 ** int(max(0.0, np.log2(SPAN / dt)))  # frames between those of the first pass and first sweeps
         self.even, self.calm, self.spread = normal(EVEN, dt), normal(CALM, dt), normal(SPREAD, self.span * dt)
-        # by frames: goals, free postures, those within speed limits, the free fit, where it has the
+        # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
         # points that may be held, deviations of the first pass, what is held in sweeps, postures, deviations of the
         # sweeps
-        self._wanted = dict[int, Wanted]()
-        self._chain, self._slow, self._even, self._free, self._paths = (dict[int, Array]() for _ in range(5))
+        self._wanted, self._chain = dict[int, Wanted](), dict[int, tuple[Array, float]]()
+        self._slow, self._even, self._free, self._paths = (dict[int, Array]() for _ in range(4))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
         self._held = dict[int, tuple[int, tuple[Array, Array]]]()
         self._dips = dict[int, list[float]]()  # shares of the motion to a frame at which something overlaps
+        self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
         self._stages: list[tuple[Callable[[int], None], int]] = [
@@ -139,6 +140,14 @@ class Run:
         self._came += 1
         return self._advanced()
 
+    def led_by(self, frames: list[Wanted]) -> None:
+        """Know frames before they come: fitted backward in time too, these may have better postures."""
+        following: tuple[Array, float] | None = None
+        for k in range(len(frames) - 1, -1, -1):
+            self._wanted[k] = frames[k]
+            following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % self.every == 0)
+            self._backward[k] = following
+
     def finish(self) -> list[Array]:
         """The postures (nq,) of the last frames."""
         self.ended = True
@@ -168,24 +177,31 @@ class Run:
         wanted = self._wanted[frame]
         return Goals(wanted.places, wanted.turns, *(held or self.none), posture, weights)
 
-    def _fit(self, k: int) -> None:
-        """The free posture of a frame, from that before; now and then anew if that is better."""
-        goals, cost = self._goals(k, self.upright, self.stay), np.inf
-        if k:
-            self._chain[k], cost = self.fitter.descend(self._chain[k - 1], goals, FREE)
-        if k % self.every:
-            return
+    def _fitted(self, k: int, near: Array | None, anew: bool) -> tuple[Array, float]:
+        """The free posture of a frame and its cost, from a posture near to it, or anew if that is better."""
+        goals = self._goals(k, self.upright, self.stay)
+        best = (self.upright, np.inf) if near is None else self.fitter.descend(near, goals, FREE)
+        if not anew:
+            return best
         q = np.array(self.upright)
         if self.led:
             hips = self._wanted[k].places[self.hips].mean(axis=0)
             q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self._wanted[k].root, hips))
-        q, anew = self.fitter.descend(q, goals, FIRST)
-        if anew < WORTH * cost:
-            self._chain[k] = q
+        alone = self.fitter.descend(q, goals, FIRST)
+        return alone if alone[1] < WORTH * best[1] else best
+
+    def _fit(self, k: int) -> None:
+        """The free posture of a frame, from that before."""
+        near = self._chain[k - 1][0] if k else None
+        best = self._fitted(k, near, k % self.every == 0)
+        other = self._backward.pop(k, None)
+        if other is not None and other[1] < WORTH * best[1]:
+            best = other
+        self._chain[k] = best
 
     def _slowed(self, k: int) -> None:
         """The free posture within speed limits: the middle between what keeps to them forward and backward in time."""
-        q = np.array(self._chain[k])
+        q = np.array(self._chain[k][0])
         for joint in self.model.joints[1:] if k else ():
             if joint.nq not in (joint.nv, 2):  # a quaternion may have either sign
                 turned = slice(joint.idx_q + joint.nq - 4, joint.idx_q + joint.nq)
@@ -195,9 +211,9 @@ class Run:
             here = q[values]
             self._front = np.clip(here, self._front - most, self._front + most) if k else here
             last = min(k + self.slowing, self._came - 1)
-            back = self._chain[last][values]
+            back = self._chain[last][0][values]
             for j in range(last - 1, k - 1, -1):
-                back = np.clip(self._chain[j][values], back - most, back + most)
+                back = np.clip(self._chain[j][0][values], back - most, back + most)
             q[values] = 0.5 * (self._front + back)
             if k:  # a longer way than a window slows
                 q[values] = np.clip(q[values], self._slow[k - 1][values] - most, self._slow[k - 1][values] + most)

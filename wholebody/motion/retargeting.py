@@ -128,6 +128,7 @@ def retarget(
     frames, lost, inside = wanted_of(wanted, roles), "", ""
     with world.borrow() as workspace:
         alone = Run(figure, wanted, roles, motion.dt, None, workspace)
+        alone.led_by(frames)
         q = _postures(alone, frames, progress, 0.0)
         if ground is not None or scene is not None:
             held = NOTHING if ground is None else found

@@ -30,7 +30,8 @@ from wholebody.scene.scene import Scene
 class Retargeter:
     """Retargets a stream of skeletons, by the same run as `wb.retarget`.
 
-    Each posture follows `ahead` frames after its skeleton: so many are looked at before a posture is fixed. Feet are held
+    Each posture follows `ahead` frames after its skeleton: so many are looked at before a posture is fixed. A recording
+    is fitted backward in time too; where only that finds better postures, those of a stream differ. Feet are held
     where they rest on a level floor; hands, knees and contacts with things are held in recordings alone.
 
     Attributes:
