@@ -108,6 +108,7 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)  # what is imported later stays too
+    gc.enable()
 
 
 @pytest.fixture(scope="session")
