@@ -88,7 +88,7 @@ def test_a_hand_that_rests_on_the_body_does_so(part: str, stature: float, tmp_pa
 
 
 def test_hands_of_a_walk_swing_past_the_thighs(shared_data: Path) -> None:
-    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_35_01.bvh")
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_35_01.bvh").part(0, 60)
     assert to_part(wb.retarget(motion, wb.load("human")), "right_thigh")[:, 0].min() > 0.02
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -66,9 +67,8 @@ def gaps(clip: wb.Clip, side: str, thing: str = "box", shape: coal.ShapeBase = B
     return np.array(found)
 
 
-@pytest.mark.parametrize("stature", [1.4, 1.9])
-def test_hands_stay_at_their_places_of_a_box_that_they_lift(stature: float) -> None:
-    motion, track = lifting()
+def test_hands_stay_at_their_places_of_a_box_that_they_lift() -> None:
+    stature, (motion, track) = 1.4, lifting()
     figure = wb.load("human", stature=stature)
     scene = among(figure, track[0])
     clip = wb.retarget(motion, figure, scene, things={"box": track})
@@ -83,8 +83,6 @@ def test_hands_stay_at_their_places_of_a_box_that_they_lift(stature: float) -> N
         assert np.abs(off[:, [1, 3]]).max() < 1e-2
         assert 0.0 < sign * off[0, 2] - 0.5 * SIZE[1] < 0.02  # the wrist is as far from it as half a hand is thick
     assert wb.check(clip, scene).free
-    if stature > 1.5:  # nearly of the skeleton's size
-        return
     alone = wb.retarget(motion, figure, ground=None)  # without the box the hands are inside it
     assert np.abs(gaps(wb.Clip(figure, alone.q, alone.dt, things=clip.things), "left")[:, 0]).min() > 5e-3
 
@@ -225,7 +223,15 @@ def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsReco
     scene = among(figure, track[0]).add(wb.Box((0.1, 0.1, 0.1)), name="post", at=(3.0, 3.0, 0.05))
     clip = wb.retarget(motion, figure, scene, things={"box": track})  # beside the post the box keeps its way
     assert clip.things["box"][:, :3] == pytest.approx(np.array([at.translation for at in track]))
-    assert any("left_wrist does not reach box in frames" in str(one.message) for one in recwarn)
+    told = next(str(one.message) for one in recwarn if "does not reach box" in str(one.message))
+    for side in ("left", "right"):
+        away = gaps(clip, side)[:, 0]
+        first, last, far = map(
+            int, re.findall(rf"{side}_wrist does not reach box in frames (\d+) to (\d+) .*? (\d+) mm", told)[0]
+        )
+        assert last == len(clip) - 1
+        assert away[:first].max() < 5e-3
+        assert far == round(1e3 * away.max())
     assert wb.check(clip, scene).colliding == 0
     assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.1  # the body does not go after it
 
@@ -267,6 +273,23 @@ def test_a_hand_rests_on_the_ground_before_and_after_it_touches_a_thing() -> Non
     paths = {frame: np.zeros((2, 3)) for frame in range(60)}
     weights = [held.goals(frame, paths, np.zeros(3))[1][:, 0] for frame in (3, 25, 45)]
     assert [(ground > 0.0, thing > 0.0) for ground, thing in weights] == [(True, False), (False, True), (True, False)]
+
+
+def test_what_is_let_go_of_in_any_run_is_told_frame_by_frame() -> None:
+    """A contact of frames 20 to 29 that a run loses in frame 28, and the next one in frame 21."""
+    scene = among(wb.load("human"), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])))
+    contact = ThingContact("left_hand", 20, 30, "box", np.array([0.0, 0.15, 0.0]), np.array([0.0, 1.0, 0.0]))
+    points, q = [HeldPoint("left_hand", "", 1, np.zeros(3), thing=True)], scene.figure.neutral
+    held = Holds(points, NOTHING, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact]))
+    held.begin({20: q})
+    paths = {frame: np.zeros((1, 3)) for frame in range(40)}
+    for lost in (28, 21):
+        for frame in range(20, 30):
+            goals = held.goals(frame, paths, np.zeros(3))
+            assert frame != lost or held.lost(frame, q, goals[0] + (0.1, 0.0, 0.0), goals)
+        assert held.give_up()
+    assert not held.give_up()
+    assert "left_hand does not reach box in frames 20 to 21 and 28 to 29" in held.let_go(np.tile(q, (40, 1)))
 
 
 def test_check_moves_the_things_of_a_clip() -> None:

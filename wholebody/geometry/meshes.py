@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from codecs import BOM_UTF8
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -120,11 +121,11 @@ def _read_scene(path: Path) -> tuple[Any, float]:
     level = quiet.level
     quiet.setLevel(logging.CRITICAL)
     try:
-        wanted = _bytes_of_stl(path)
-        if wanted is not None and wanted < path.stat().st_size:  # trimesh takes a file with more at its end for text
-            scene = trimesh.load_scene(BytesIO(path.read_bytes()[:wanted]), file_type="stl", process=False)
-        else:
+        if (part := _part_of(path)) is None:
             scene = trimesh.load_scene(path, process=False)
+        else:
+            beside = trimesh.resolvers.FilePathResolver(path)
+            scene = trimesh.load_scene(part, file_type=path.suffix[1:].lower(), resolver=beside, process=False)
         # trimesh writes the unit of a COLLADA file as "meters", or "0.0254 * meters"
         unit = (scene.units or "").partition("*")[0] if path.suffix.lower() == ".dae" else ""
         return scene, float(unit) if is_number(unit) else 1.0
@@ -148,6 +149,16 @@ def check_content(path: Path) -> None:
     wanted = _bytes_of_stl(path)
     if wanted is not None and size < wanted:
         raise FileFormatError(f"mesh {path}: the file has {size} bytes of {wanted}; it is truncated; fetch it again")
+
+
+def _part_of(path: Path) -> BytesIO | None:
+    """What trimesh is to read of a file whose first or last bytes it misreads; None for others."""
+    wanted = _bytes_of_stl(path)
+    if wanted is not None and wanted < path.stat().st_size:  # with more at its end it would be text
+        return BytesIO(path.read_bytes()[:wanted])
+    with path.open("rb") as file:
+        marked = path.suffix.lower() == ".obj" and file.read(len(BOM_UTF8)) == BOM_UTF8  # its first line would be lost
+        return BytesIO(file.read()) if marked else None
 
 
 def _bytes_of_stl(path: Path) -> int | None:

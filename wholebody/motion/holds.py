@@ -28,6 +28,7 @@ TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
+OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
 
@@ -127,6 +128,7 @@ class Holds:
         self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
         self._places: dict[tuple[int, int], Array] = {}
         self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
+        self._let_go: set[tuple[int, int]] = set()  # the same of all runs, with what is too short to be held between
 
     def lost(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> bool:
         """Whether points (h, 3) are too far from the things that they are to touch; these are let go of in the frame.
@@ -136,8 +138,7 @@ class Holds:
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
             normal, gap, off = self._met(number, stand, frame, q, places, held[0])
-            # m: points farther than this from their place on a thing cannot reach it
-            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > 0.02:
+            if np.hypot(np.linalg.norm(off - (off @ normal) * normal), gap) > OUT_OF_REACH:
                 held[1][number] = 0.0
                 self._gone.add((number, frame))
         return any(each[1] == frame for each in self._gone)
@@ -172,9 +173,9 @@ class Holds:
         normal = self._touched.at(stand, frame).rotation @ stand.normal
         return normal, gap, places[number] - goals[number]
 
-    def give_up(self) -> str:
-        """Split the contacts with things where points were let go of; says which, or nothing."""
-        reports, places = [], dict[tuple[int, int], Array]()
+    def give_up(self) -> bool:
+        """Split the contacts with things where points were let go of; says whether there were any."""
+        places, found = dict[tuple[int, int], Array](), bool(self._gone)
         for number, stands in enumerate(self._stands):
             kept = list[Foothold | ThingContact]()
             for stand in stands:
@@ -182,18 +183,35 @@ class Holds:
                 if not isinstance(stand, ThingContact) or reached.all():
                     kept.append(stand)
                     continue
-                lost = stand.first + np.flatnonzero(~reached)
-                reports.append(
-                    f"{self.points[number].role} does not reach {stand.thing} in frames {lost[0]} to {lost[-1]}"
-                )
+                long = long_runs(reached, self.over)
+                self._let_go |= {(number, stand.first + frame) for frame in np.flatnonzero(~long).tolist()}
                 own = self._places[number, stand.first]
-                for part in runs(long_runs(reached, self.over)):
+                for part in runs(long):
                     first = stand.first + part.first
                     kept.append(with_values(stand, first=first, end=stand.first + part.end))
                     places[number, first] = own.copy()  # each part lands by itself
             self._stands[number] = kept
         self._gone.clear()
-        self._places = places if reports else self._places  # recompute where feet come down
+        self._places = places if found else self._places  # recompute where feet come down
+        return found
+
+    def let_go(self, q: Array) -> str:
+        """Which parts were let go of, or are farther than `OUT_OF_REACH` from their things in q (n, nq); or nothing."""
+        reports, touched = [], self._touched
+        for contact in () if touched is None else touched.contacts:
+            key = contact.role, contact.share, contact.base
+            for number, point in enumerate(self.points):
+                if touched is None or not point.thing or (point.role, point.share, point.base) != key:
+                    continue
+                frames = range(contact.first, min(contact.end, len(q)))
+                gaps = np.array([touched.gap(contact, point, frame, q[frame]) for frame in frames])
+                gone = np.array([(number, frame) in self._let_go for frame in frames]) | (gaps > OUT_OF_REACH)
+                if gone.any():
+                    spans = [f"{contact.first + run.first} to {contact.first + run.end - 1}" for run in runs(gone)]
+                    reports.append(
+                        f"{contact.role} does not reach {contact.thing} in frames {' and '.join(spans)} "
+                        f"(in the clip it is up to {1e3 * gaps[gone].max():.0f} mm away)"
+                    )
         return "; ".join(reports)
 
     def rest(self, role: str, frame: int) -> None:

@@ -142,10 +142,12 @@ def retarget(
             points = held_points(figure, roles, held) + touching_points(figure, roles, motion, parts, joints)
             touched = Touched(figure, Things(world, tracks), contacts)
             holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
-            runs = (Run(figure, wanted, roles, motion.dt, holds, workspace, alone.free) for _ in range(2))
-            q = _postures(next(runs), frames, progress, 0.3)
-            if lost := holds.give_up():
-                q = _postures(next(runs), frames, progress, 0.3)
+            for _ in range(2):  # the second time around what the first one could not reach
+                run = Run(figure, wanted, roles, motion.dt, holds, workspace, alone.free)
+                q = _postures(run, frames, progress, 0.3)
+                if not holds.give_up():
+                    break
+            lost = holds.let_go(q)
             inside = _said_inside(alone.fitter, holds, q)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
     if lost:

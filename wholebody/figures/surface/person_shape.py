@@ -136,7 +136,7 @@ class PersonShape:
             if part == "upper_arm":  # a raised arm pulls the flank along
                 found.append(Claim(f"{segment}/half", grown(self._armpit(side)[1], -0.006), 0.022))
             if part in HALVES:
-                radius = {"upper_arm": 0.050, "forearm": 0.020, "hand": 0.026, "thigh": 0.060, "shank": 0.030}[part]
+                radius = {"upper_arm": 0.035, "forearm": 0.020, "hand": 0.026, "thigh": 0.060, "shank": 0.030}[part]
                 reach = radius * self.size.stature / 1.75
                 found.append(Claim(f"{segment}/half", grown(ball(self.at(segment), reach), 0.006)))
         return found
@@ -185,14 +185,14 @@ class PersonShape:
 
     def _armpit(self, side: str) -> list[Field]:
         """Folds before and behind the armpit: from the chest and from the flank to the upper arm."""
-        scale, sign, radius = self._scale, dict(SIDES)[side], 0.5 * self.person.radius("upper_arm")
+        scale, sign, radius = self._scale, dict(SIDES)[side], 0.4 * self.person.radius("upper_arm")
         folds = []
         for trunk_part, start, ahead in (
             ("thorax", (0.055, sign * 0.080, 0.045), 0.016),
             ("lower_thorax", (-0.040, sign * 0.090, 0.060), -0.016),
         ):
             end = self.at(f"{side}_upper_arm", np.array([ahead, 0.0, -0.055]) * scale)
-            folds.append(round_cone(self.at(trunk_part, np.array(start) * scale), end, 0.045 * scale, radius))
+            folds.append(round_cone(self.at(trunk_part, np.array(start) * scale), end, 0.032 * scale, radius))
         return folds
 
     def _trousers(self) -> Garment:
