@@ -14,7 +14,6 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.fields import Range
 from wholebody.figures.state import State
 from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
@@ -27,8 +26,6 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import Bound, Constraint, Goal, filled
-
-CLEARANCE = Range(0.0, 0.5, "m")  # of a method that keeps one
 
 
 class AvoidProgress(NamedTuple):
@@ -96,12 +93,12 @@ class Follower:
         self._goal = Posture(terms.q[0]).resolve(terms.scene, q)
         self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
 
-    def frame(self, number: int, q: Array, more: float = 0.0, *, goal: Array | None = None) -> Array:
-        """The posture (nq,) of a frame, after three steps at most, with `more` metres of clearance, towards `goal`."""
+    def frame(self, number: int, q: Array, *, goal: Array | None = None) -> Array:
+        """The posture (nq,) of a frame, after three steps at most, towards `goal`."""
         terms, problem = self._terms, self._problem
         if terms.kept(number):
             return np.array(terms.q[number])
-        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
+        problem.clearances = np.full_like(problem.clearances, self._clearance)
         q = terms.within(number, q)
         target = terms.q[number] if goal is None else goal
         near = filled(self._goal, target=target, resolved_target=target)

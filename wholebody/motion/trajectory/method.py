@@ -12,7 +12,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Range
-from wholebody.motion.avoider import CLEARANCE, MethodResult, Run
+from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
@@ -56,7 +56,7 @@ class Trajectory(Checked):
 
     name: ClassVar[str] = "trajectory"
 
-    clearance: Annotated[float, CLEARANCE] = 0.0
+    clearance: Annotated[float, Range(0.0, 0.5, "m")] = 0.0
     time: Annotated[float, Range(0.0, 100.0, "s")] | None = None
     margin: Annotated[float, Range(0.0, 100.0, "s")] = 0.5
     stretch: Annotated[float, Range(1.0, 100.0)] = 1.0
