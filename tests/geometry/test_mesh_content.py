@@ -39,6 +39,24 @@ def test_a_cut_stl_is_refused(tmp_path: Path) -> None:
         wb.Mesh(tmp_path / "ball.stl")
 
 
+def test_an_stl_in_capitals_and_one_with_more_at_its_end_are_read(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(1)
+    (tmp_path / "capitals.stl").write_text(str(ball.export(file_type="stl_ascii")).upper())
+    (tmp_path / "longer.stl").write_bytes(ball.export(file_type="stl") + b"made by nobody" * 9)
+    for name in ("capitals", "longer"):
+        mesh = wb.Mesh(tmp_path / f"{name}.stl")
+        assert len(mesh.faces) == 80
+        assert np.ptp(mesh.vertices, axis=0) == pytest.approx(np.ptp(ball.vertices, axis=0), abs=1e-6)
+
+
+def test_an_obj_with_a_byte_order_mark_keeps_its_first_corner(tmp_path: Path) -> None:
+    corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)]
+    lines = ["v {} {} {}".format(*corner) for corner in corners] + ["f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4"]
+    (tmp_path / "a.obj").write_text("\n".join(lines), encoding="utf-8-sig")
+    mesh = wb.Mesh(tmp_path / "a.obj")
+    assert sorted(map(tuple, mesh.vertices.tolist())) == sorted(corners)
+
+
 def test_ply_is_read_and_gltf_is_y_up(tmp_path: Path) -> None:
     box = trimesh.creation.box((1.0, 2.0, 3.0))
     for suffix in ("ply", "glb"):

@@ -149,6 +149,49 @@ def test_a_tip_may_be_asked_onto_a_face(standing):
     assert found(standing((wb.Box((0.2, 0.2, 0.2)), (0.4, -0.3, 0.9)), goals=[goal])) == ()
 
 
+@pytest.mark.parametrize("slide", [0.0, 0.3])
+def test_a_goal_beyond_an_arm_in_one_line_misses_by_what_is_beyond(tmp_path, slide):
+    """Two bars of 0.5 and 0.4 m, and a slide: no posture is nearer, and the nearest one is in line."""
+    kind = f'"prismatic"><limit lower="-0.1" upper="{slide}" effort="1" velocity="1"/>' if slide else '"fixed">'
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "upper", "fore", "tip"))
+    (tmp_path / "arm.urdf").write_text(
+        f"""<robot name="arm">{links}
+        <joint name="a" type="continuous"><parent link="base"/><child link="upper"/><origin xyz="0 0 1"/>
+        <axis xyz="0 1 0"/></joint>
+        <joint name="b" type="continuous"><parent link="upper"/><child link="fore"/><origin xyz="0.5 0 0"/>
+        <axis xyz="0 1 0"/></joint>
+        <joint name="c" type={kind}<parent link="fore"/><child link="tip"/><origin xyz="0.4 0 0"/></joint></robot>"""
+    )
+    arm = wb.load(tmp_path / "arm.urdf")
+    tip = arm.model.getFrameId("tip")
+    places = (wb.Scene(arm).state(q).frame(tip).translation for q in _postures(arm, 400))
+    assert max(np.linalg.norm(place - [0.0, 0.0, 1.0]) for place in places) < 0.9 + slide
+    beyond = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (1.5, 0.0, 1.0))])
+    (only,) = found(beyond)
+    assert (only.status, only.least) == ("unreachable", pytest.approx(0.6 - slide, abs=1e-9))
+    for name in ("qp", "newton", "ccd"):
+        answer = wb.solve(beyond, METHODS[name]())
+        assert (answer.status, answer.assessment.goal_error) == ("unreachable", pytest.approx(0.6 - slide, rel=0.02))
+        assert "goals[0], Point('tip'), is" in answer.message
+    assert found(wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (0.899 + slide, 0.0, 1.0))])) == ()
+
+
+def test_only_what_is_fixed_bounds_the_reach(standing):
+    """A person who stands where they like gets everywhere; a frozen pelvis bounds an arm from there."""
+    goal = wb.Point("right_wrist", (5.0, 0.0, 1.0))
+    assert found(standing(goals=[goal])) == ()
+    (only,) = found(standing(goals=[goal], constraints=[wb.Hold("pelvis")]))
+    assert 3.5 < only.least < 4.5
+
+
+def _postures(figure, count):
+    rng, limits = np.random.default_rng(0), figure.limits
+    for _ in range(count):
+        q = np.asarray(pin.integrate(figure.model, figure.neutral, rng.uniform(-np.pi, np.pi, figure.model.nv)))
+        q[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
+        yield q
+
+
 def _facing(normal):
     """A rotation that turns z to a normal (3,)."""
     aside = np.cross(normal, [0.0, 0.0, 1.0])

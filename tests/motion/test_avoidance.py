@@ -105,7 +105,7 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
 def test_a_free_clip_stays_as_it_is(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 40)
     scene.move("ball", at=(3.0, 0.0, 0.0))
-    for method in ("trajectory", "frames"):
+    for method in ("trajectory", "bisection"):
         found = wb.avoid(clip, scene, method=method)
         np.testing.assert_array_equal(found.clip.q, clip.q)
         assert found.report.solved
@@ -126,7 +126,7 @@ def test_a_thin_thing_between_two_frames_is_not_passed(planar_arm: Callable[...,
 
 @pytest.mark.parametrize(
     ("method", "beyond"),
-    [("trajectory", [0.2]), ("frames", [0.2]), ("bisection", [0.2, 0.5, 0.2])],
+    [("trajectory", [0.2]), ("bisection", [0.2, 0.5, 0.2])],
 )
 def test_a_thin_thing_passed_wholly_between_two_frames_is_not_passed(
     planar_arm: Callable[..., Figure], method: str, beyond: list[float]
@@ -153,7 +153,7 @@ def test_a_thin_thing_passed_for_good_is_not_passed(planar_arm: Callable[..., Fi
     scene.add(wb.Box((0.3, 0.002, 0.3)), name="plate", at=(0.75, 0.0, 0.0))
     angle = np.concatenate([np.linspace(-0.8, -0.2, 20), np.linspace(0.2, 0.6, 20)])
     clip = wb.Clip(figure, np.stack([angle, np.full(len(angle), 0.3)], axis=1), DT)
-    found = wb.avoid(clip, scene, method="frames")
+    found = wb.avoid(clip, scene, method="bisection")
     assert found.report.before.dips == 1
     assert found.report.solved, found.report.message
     first, second = found.clip.q[:, 0], found.clip.q.sum(axis=1)
@@ -163,7 +163,7 @@ def test_a_thin_thing_passed_for_good_is_not_passed(planar_arm: Callable[..., Fi
 
 def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 30)
-    for method in ("trajectory", "frames"):
+    for method in ("trajectory", "bisection"):
         found = wb.avoid(clip, scene, method=method, constraints=[wb.Freeze("all")])
         assert not found.report.solved
         assert "collide" in found.report.message
@@ -218,7 +218,7 @@ def arm_into_trunk(human: Figure, frames: int = 16) -> wb.Clip:
 
 def test_a_forearm_in_the_trunk_comes_out(human: Figure) -> None:
     clip = arm_into_trunk(human)
-    found = wb.avoid(clip, method="frames")
+    found = wb.avoid(clip, method="bisection")
     assert found.report.before.deepest > 0.05
     assert found.report.solved, found.report.message
 
@@ -294,7 +294,7 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
 
 def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 5)
-    assert set(METHODS) >= {"trajectory", "frames", "bisection"}
+    assert set(METHODS) >= {"trajectory", "bisection"}
     with pytest.raises(wb.UnknownNameError, match="trajectory"):
         wb.avoid(clip, scene, method="trajectry")
     with pytest.raises(wb.InputError, match="other joints"):
@@ -303,14 +303,14 @@ def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
 
 def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.CaptureFixture[str]) -> None:
     arm_into_trunk(human, 10).write(tmp_path / "arm.npz")
-    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames"]) == 0
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "bisection"]) == 0
     told = capsys.readouterr().out
     assert "nothing collides" in told
     free = wb.read_clip(tmp_path / "arm-free.npz", human)
     assert wb.check(free).free
     assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "none"]) == 2
-    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames", "--stretch", "2"]) == 2
-    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames", "--dynamics"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "bisection", "--stretch", "2"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "bisection", "--dynamics"]) == 2
     told = capsys.readouterr()
     assert "does not slow" in told.err + told.out
     assert "does not take dynamics" in told.err + told.out
@@ -334,12 +334,12 @@ def test_an_answer_is_told_in_three_lines() -> None:
     human = wb.load("human")
     standing = human.posture("standing")
     inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
-    freed = wb.avoid(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"), method="frames")  # type: ignore[arg-type]
+    freed = wb.avoid(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"), method="bisection")  # type: ignore[arg-type]
     lines = str(freed).splitlines()
     assert len(lines) == 3
     assert lines[0].startswith("an arm, free: nothing collides")
     assert "frames in collision 1 before, 0 after" in lines[1]
-    assert lines[2].startswith("frames: ")
+    assert lines[2].startswith("bisection: ")
     assert str(freed.report) == str(freed).removeprefix("an arm, ")
     assert len(repr(freed)) < 200
 

@@ -32,10 +32,10 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
     told: list[wb.motion.BatchProgress] = []
 
     def run(*equipment: str) -> tuple[wb.motion.AvoidedCase, ...]:
-        return wb.motion.avoid_many([clip], tmp_path, equipment=equipment, methods=["frames"], progress=told.append)
+        return wb.motion.avoid_many([clip], tmp_path, equipment=equipment, methods=["bisection"], progress=told.append)
 
     (first,) = run("nothing")
-    alone = wb.avoid(clip, method="frames")
+    alone = wb.avoid(clip, method="bisection")
     assert (first.outcome, first.colliding_before, first.colliding) == ("free", alone.report.before.colliding, 0)
     made = wb.read_clip(tmp_path / first.file, clip.figure)
     assert np.array_equal(made.q, alone.clip.q)
@@ -43,7 +43,7 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
     assert [(now.done, now.total) for now in told] == [(0, 1), (1, 1)]
     again, packed = run("nothing", "pack")
     assert again == first  # its seconds too
-    assert (packed.equipment, packed.file) == ("pack", "an_arm-pack-frames.npz")
+    assert (packed.equipment, packed.file) == ("pack", "an_arm-pack-bisection.npz")
     assert [row["file"] for row in csv.DictReader((tmp_path / SHEET).open())] == [first.file, packed.file]
     rows = (json.loads(line)[1] for line in (tmp_path / TABLE).read_text().splitlines()[1:])
     assert [row["frames"] for row in rows] == [len(clip)] * 2
@@ -54,11 +54,9 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
 
 
 def test_another_clip_of_the_name_or_other_settings_are_done_anew(clip: wb.Clip, tmp_path: Path) -> None:
-    (first,) = wb.motion.avoid_many([clip], tmp_path, methods=["frames"])
-    kept = wb.motion.avoid_many(
-        [clip[1:]], tmp_path, methods=[wb.motion.PerFrame(), wb.motion.PerFrame(clearance=0.01)]
-    )
-    assert [row.method for row in kept] == ["frames", "frames 2"]
+    (first,) = wb.motion.avoid_many([clip], tmp_path, methods=["bisection"])
+    kept = wb.motion.avoid_many([clip[1:]], tmp_path, methods=[wb.motion.Bisection(), wb.motion.Bisection(room=0.02)])
+    assert [row.method for row in kept] == ["bisection", "bisection 2"]
     assert kept[0].frames == first.frames - 1
     assert kept[1].angle > kept[0].angle
 
@@ -69,7 +67,7 @@ def test_what_is_wrong_with_one_file_is_told_and_the_others_are_made(
     (tmp_path / "broken.csv").write_text("time\n")
     good = clip.write(tmp_path / "good.npz")
     rows = wb.motion.avoid_many(
-        [tmp_path / "broken.csv", good], tmp_path / "out", figure=human, methods=["frames"], jobs=2
+        [tmp_path / "broken.csv", good], tmp_path / "out", figure=human, methods=["bisection"], jobs=2
     )
     assert [row.outcome for row in rows] == ["refused", "free"]
     assert "broken.csv" in rows[0].message
@@ -88,7 +86,7 @@ def test_input_is_refused_before_anything_is_written(clip: wb.Clip, tmp_path: Pa
         ({"clips": ["walk.bvh", 5]}, "a clip is 5; give the path"),
         ({"equipment": ["pak"]}, "pack"),
         ({"equipment": ["pack", "pack"]}, "two pieces of equipment are named 'pack'"),
-        ({"methods": ["framse"]}, "frames"),
+        ({"methods": ["bisectoin"]}, "bisection"),
         ({"jobs": 0}, "jobs is 0"),
     ):
         with pytest.raises(wb.WholebodyError, match=sentence):
@@ -107,7 +105,7 @@ def told_to(command: list[str], said: Path) -> None:
 def test_a_batch_that_is_ended_goes_on(clip: wb.Clip, tmp_path: Path) -> None:
     """No half file is left, and the case that was made before is not made again."""
     files = [str(clip[k:].write(tmp_path / f"part{k}.npz")) for k in range(2)]
-    command = ["clip", "avoid", *files, "--method", "frames", "--out", str(tmp_path / "out")]
+    command = ["clip", "avoid", *files, "--method", "bisection", "--out", str(tmp_path / "out")]
     run = multiprocessing.get_context("fork").Process(target=told_to, args=(command, tmp_path / "said"))
     run.start()
     table, ends = tmp_path / "out" / SHEET, time.monotonic() + 120.0

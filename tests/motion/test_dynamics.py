@@ -100,7 +100,7 @@ def test_a_strength_that_the_clip_kept_is_said(tmp_path: Path) -> None:
 def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
     clip = wheel(tmp_path, 2.0)
     with pytest.raises(wb.InputError, match="trajectory"):
-        wb.avoid(clip, dynamics=True, method="frames")
+        wb.avoid(clip, dynamics=True, method="bisection")
     with pytest.raises(wb.InputError, match="dynamics"):
         wb.avoid(clip, dynamics="strong")  # type: ignore[arg-type]
     with pytest.raises(wb.InputError, match="dynamics"):
@@ -152,19 +152,6 @@ def test_nothing_is_asked_of_a_recording_beyond_what_it_keeps(recorded: wb.Clip)
     assert not judged.beyond.any()
     assert not judged.farther.any()
     assert not judged.missed
-
-
-def test_loads_are_drawn_beside_those_before(recorded: wb.Clip) -> None:
-    public = wb.motion.torques(recorded)
-    doubled = replace(public, force=2.0 * public.force)
-    chart = LoadChange(public, doubled, np.arange(float(len(recorded)))).plot()
-    before, after = ([line for line in chart.axes[1].lines if line.get_linestyle() == style] for style in ("--", "-"))
-    assert len(before) == len(after) == len(public.feet)
-    for foot, (old, new) in enumerate(zip(before, after, strict=True)):
-        force = np.linalg.norm(public.force[:, foot], axis=1)
-        np.testing.assert_allclose(old.get_ydata(), force)
-        np.testing.assert_allclose(new.get_ydata(), 2.0 * force)
-        np.testing.assert_allclose(old.get_xdata(), recorded.times)
 
 
 @pytest.mark.parametrize(("inside", "told"), [(True, "was within it before"), (False, "mm before")])

@@ -242,9 +242,9 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     clip = wb.Clip(human, np.tile(sunk, (3, 1)), DT)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     with pytest.warns(UserWarning, match=r"left_foot stands up to 30 mm inside floor.*hold_feet=False"):
-        held = wb.avoid(clip, scene, method="frames").report
+        held = wb.avoid(clip, scene).report
     assert (held.solved, "stands up to 30 mm" in held.message) == (False, True)
-    assert wb.avoid(clip, scene, method="frames", hold_feet=False).report.after.free
+    assert wb.avoid(clip, scene, hold_feet=False).report.after.free
 
 
 def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) -> None:
@@ -253,11 +253,11 @@ def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) 
     skate = wb.Box((0.2, 0.02, 0.04))
     floor.attach(skate, to="left_foot", name="skate", at=(0.05, 0.0, -0.09), rests_on=["left_foot", "left_toes"])
     with pytest.warns(UserWarning, match=r"skate stands up to \d+ mm inside floor.*hold_feet=False"):
-        assert not wb.avoid(clip, floor, method="frames").report.solved
+        assert not wb.avoid(clip, floor).report.solved
     at = human.placement(clip.q[0], "right_palm").translation
     beside = wb.Scene(human).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=at)
     with pytest.warns(UserWarning, match=r"right_hand is held up to \d+ mm inside box; leave that Hold out"):
-        held = wb.avoid(clip, beside, method="frames", constraints=[wb.Hold("right_palm")])
+        held = wb.avoid(clip, beside, constraints=[wb.Hold("right_palm")])
     assert not held.report.solved
 
 
@@ -268,17 +268,17 @@ def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Fi
     clip = wb.Clip(human, [inside, inside, bent, bent, standing], DT)
     said = r"jumps from frame 1 to 2 \(left_elbow_flexion by 0.74 rad.*clip\[:2\].*first posture.*give clip\[4:\]"
     with pytest.warns(UserWarning, match=said):
-        wb.avoid(clip, method="frames", keep_ends=True, progress=lambda _: True)
+        wb.avoid(clip, keep_ends=True, progress=lambda _: True)
     with pytest.warns(UserWarning, match=r"last posture overlaps by .* give clip\[:1\]"):
-        wb.avoid(wb.Clip(human, [standing, inside], DT), method="frames", keep_ends=True, progress=lambda _: True)
+        wb.avoid(wb.Clip(human, [standing, inside], DT), keep_ends=True, progress=lambda _: True)
     with pytest.warns(UserWarning, match="jumps from frame 1 to 2"):
-        freed = wb.avoid(wb.Clip(human, [inside, inside, bent, bent], DT), method="frames").report
+        freed = wb.avoid(wb.Clip(human, [inside, inside, bent, bent], DT)).report
     assert (freed.solved, "jumps" in freed.message) == (True, False)
     with warnings.catch_warnings():  # a recording that is only fast, or jumps where it is free
         warnings.simplefilter("error")
-        wb.avoid(wb.Clip(human, [inside, inside], DT), method="frames", progress=lambda _: True)
+        wb.avoid(wb.Clip(human, [inside, inside], DT), progress=lambda _: True)
         fast = [human.with_joints(standing, {"left_elbow_flexion": by}) for by in (0.1, 1.3, 1.3)]
-        freed = wb.avoid(wb.Clip(human, fast, DT), method="frames", keep_ends=True)
+        freed = wb.avoid(wb.Clip(human, fast, DT), keep_ends=True)
     np.testing.assert_array_equal(freed.clip.q[[0, -1]], [fast[0], fast[-1]])
 
 

@@ -29,7 +29,7 @@ class Near(wb.Constraint):
 
 @pytest.mark.parametrize(
     ("method", "part"),
-    [("trajectory", "value"), ("frames", "value"), ("frames", "jacobian"), ("bisection", "jacobian")],
+    [("trajectory", "value"), ("bisection", "value"), ("bisection", "jacobian")],
 )
 def test_the_clip_stays_and_the_term_is_named(method: str, part: str) -> None:
     figure = wb.load("hand")

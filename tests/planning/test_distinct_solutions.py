@@ -139,9 +139,14 @@ def test_parallel_axes_of_a_wrist_leave_postures_between_the_branches() -> None:
 
 
 def test_out_of_reach_there_are_none(arm: wb.Figure) -> None:
-    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (2.0, 0.0, 0.5))])
-    found = wb.solutions(problem, starts=10)
-    assert (len(found), found.descents, found.starts, found.complete) == (0, 0, 10, False)
+    length = sum(np.linalg.norm(place.translation) for place in list(arm.model.jointPlacements)[2:])
+    tip = arm.model.frames[arm.model.getFrameId("tip")]
+    length += np.linalg.norm(tip.placement.translation)
+    shoulder = np.asarray(arm.model.jointPlacements[1].translation)
+    near, far = (shoulder + share * length * np.array([0.6, 0.0, 0.8]) for share in (0.999, 1.001))
+    assert len(wb.solutions(wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", near)]), starts=10)) >= 1
+    found = wb.solutions(wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", far)]))
+    assert (len(found), found.descents, found.starts, found.complete) == (0, 0, 0, True)
 
 
 def test_a_person_has_distinct_answers() -> None:

@@ -108,6 +108,12 @@ def test_what_is_wrong_is_told_in_one_sentence(
         assert part in said, said
 
 
+@pytest.mark.parametrize("title", ["two\\nlines", "nul \\u0000", "x" * 1000])
+def test_a_title_is_a_line(write: Callable[[str], Path], title: str) -> None:
+    with pytest.raises(WholebodyError, match=r"key title is .*; give a line of text, at most 200 characters"):
+        read_task(write(f'title = "{title}"\n[figure]\nname = "human"\n'))
+
+
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"a = 1\x00", b"[" * 10_000])
 def test_what_is_no_text_or_no_toml_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "task.toml"

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.tracking import inner_paths
-from wholebody.tracking.inner_paths import resampled, timed
+from wholebody.tracking.inner_paths import timed
 from wholebody.tracking.loop import follow
 
 DT = 0.1
@@ -33,35 +30,6 @@ def test_the_postures_within_a_frame_stand_at_their_shares_of_it() -> None:
     assert found.times[[0, 1, 3]] == pytest.approx([0.0, 0.25 * DT, DT])
     assert (np.diff(found.times) > 0.0).all()
     assert found.frames == [0, 1, 1, 1]
-
-
-def test_a_file_of_a_motion_goes_along_its_paths(planar_arm, tmp_path) -> None:
-    """A reader who goes straight from row to row meets the postures within frames at their times."""
-    arm = planar_arm((0.5, 0.4, 0.3))
-    start, inner, other, end = (np.array((0.02 * angle, 0.2, 0.2)) for angle in (0, 3, 5, 1))
-    way = ((0.0, start), (0.3, inner), (0.55, other), (1.0, end))
-    motion = SimpleNamespace(q=np.array((start, end, end)), dt=DT, paths=((), way, ()))
-    track = wb.read_clip(resampled(arm, motion).write(tmp_path / "way.csv"), arm)
-    for share, q in way:
-        place = share * DT / track.dt
-        rows = track.q[int(place)], track.q[min(int(place) + 1, len(track) - 1)]
-        assert rows[0] + (place - int(place)) * (rows[1] - rows[0]) == pytest.approx(q, abs=1e-3)
-    assert (len(track) - 1) * track.dt == pytest.approx(2 * DT)
-    straight = SimpleNamespace(q=motion.q, dt=DT)
-    np.testing.assert_array_equal(resampled(arm, straight).q, motion.q)
-
-
-def test_no_more_rows_than_a_clip_may_have(planar_arm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A detour of a thousandth of a frame asks for more than 64 rows a frame."""
-    figure = planar_arm((0.4, 0.3))
-    there, beside = np.array([0.2, 0.1]), np.array([1.2, 0.1])
-    path = ((0.0, there), (0.499, there), (0.5, beside), (0.501, there), (1.0, there))
-    motion = SimpleNamespace(q=np.array([there] * 10), dt=0.1, paths=((), path, *[()] * 8))
-    with pytest.warns(UserWarning, match="64 rows a frame"):
-        assert len(resampled(figure, motion)) == 9 * 64 + 1
-    monkeypatch.setattr(inner_paths, "MOST_FRAMES", 100)
-    with pytest.warns(UserWarning, match="; 8 rows a frame"):
-        assert len(resampled(figure, motion)) == 9 * 8 + 1
 
 
 def test_as_many_paths_as_postures() -> None:

@@ -85,3 +85,26 @@ def test_a_page_for_pictures_has_the_shaders_of_a_person_among_things(
     viewer.show(figure.posture("standing"), problem=problem)
     viewer.picture(tmp_path / "person.png", (320, 240))
     assert set(browser.evaluate(programs)) <= there
+
+
+def test_a_picture_is_the_same_where_what_faces_away_from_the_sun_asks_for_shadows_too(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Light from behind is no light: shadows are asked for in fewer places, as three's own shaders ask everywhere."""
+    page = picture_page()
+    everywhere = page.replace("directLight.direction ) > 0.0 ?", "directLight.direction ) > -2.0 ?")
+    assert everywhere != page
+    figure = load("human")
+    scene = Scene(figure).add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
+    scene.add(Box((0.4, 0.4, 0.4)), name="crate", at=(0.6, 0.0, 0.2))
+    monkeypatch.setattr(screenshot, "Browser", lambda **_: browser)
+    found = []
+    for text, side in ((page, "> 0.0"), (everywhere, "> -2.0")):
+        monkeypatch.setattr(screenshot, "picture_page", lambda text=text: text)
+        browser.open_html(text)
+        viewer = Viewer(scene, screenshots=Screenshots())
+        viewer.show(figure.posture("standing"))
+        picture = viewer.picture(tmp_path / "person.png", (320, 240))
+        found.append(np.asarray(Image.open(picture)))
+        assert browser.evaluate(f"MeshCat.THREE.ShaderChunk.lights_fragment_begin.includes('direction ) {side} ?')")
+    assert np.array_equal(*found)

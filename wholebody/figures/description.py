@@ -212,6 +212,13 @@ def limits_of(model: pin.Model) -> Limits:
     return Limits(columns[0].astype(np.intp), columns[1].astype(np.intp), columns[2].copy(), columns[3].copy())
 
 
+def zero_within_limits(model: pin.Model) -> Array:
+    """The neutral posture (nq,), with joints whose limits exclude zero at the nearest limit."""
+    limits, q = limits_of(model), np.array(pin.neutral(model))
+    q[limits.idx_q] = np.clip(q[limits.idx_q], limits.lower, limits.upper)
+    return q
+
+
 def followers_of(model: pin.Model) -> dict[str, Follower]:
     """Return the joints of a model that follow another one."""
     found: dict[str, Follower] = {}

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, cross
-from wholebody.figures.description import ExcludedPair, limits_of
+from wholebody.figures.description import ExcludedPair, limits_of, zero_within_limits
 from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
@@ -148,9 +148,7 @@ class RestPosture(NamedTuple):
 
 def rest_posture(model: pin.Model, geometry: pin.GeometryModel) -> RestPosture:
     """Find a posture near zero that is free of self-contact; pairs that cannot be separated are removed."""
-    limits = limits_of(model)
-    zero = pin.neutral(model)
-    zero[limits.idx_q] = np.clip(zero[limits.idx_q], limits.lower, limits.upper)
+    zero = zero_within_limits(model)
     if not len(geometry.collisionPairs) or model.nv == 0:
         return RestPosture(zero, zero.copy(), (), ())
     search = _Parting(model, geometry, zero)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+from codecs import BOM_UTF8
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +121,11 @@ def _read_scene(path: Path) -> tuple[Any, float]:
     level = quiet.level
     quiet.setLevel(logging.CRITICAL)
     try:
-        scene = trimesh.load_scene(path, process=False)
+        if (part := _part_of(path)) is None:
+            scene = trimesh.load_scene(path, process=False)
+        else:
+            beside = trimesh.resolvers.FilePathResolver(path)
+            scene = trimesh.load_scene(part, file_type=path.suffix[1:].lower(), resolver=beside, process=False)
         # trimesh writes the unit of a COLLADA file as "meters", or "0.0254 * meters"
         unit = (scene.units or "").partition("*")[0] if path.suffix.lower() == ".dae" else ""
         return scene, float(unit) if is_number(unit) else 1.0
@@ -140,13 +146,30 @@ def check_content(path: Path) -> None:
         raise FileFormatError(f"mesh {path}: the file is a pointer of Git LFS, not the mesh; run: git lfs pull")
     if head.lstrip()[:14].lower().startswith((b"<!doctype html", b"<html")):
         raise FileFormatError(f"mesh {path}: the file is a web page, not the mesh; download the file itself")
-    text = head.lstrip().startswith(b"solid") and b"\0" not in head  # some binary ones begin with "solid" too
-    if path.suffix.lower() == ".stl" and len(head) >= 84 and not text:
-        wanted = 84 + 50 * int.from_bytes(head[80:84], "little")
-        if size < wanted:
-            raise FileFormatError(
-                f"mesh {path}: the file has {size} bytes of {wanted}; it is truncated; fetch it again"
-            )
+    wanted = _bytes_of_stl(path)
+    if wanted is not None and size < wanted:
+        raise FileFormatError(f"mesh {path}: the file has {size} bytes of {wanted}; it is truncated; fetch it again")
+
+
+def _part_of(path: Path) -> BytesIO | None:
+    """What trimesh is to read of a file whose first or last bytes it misreads; None for others."""
+    wanted = _bytes_of_stl(path)
+    if wanted is not None and wanted < path.stat().st_size:  # with more at its end it would be text
+        return BytesIO(path.read_bytes()[:wanted])
+    with path.open("rb") as file:
+        marked = path.suffix.lower() == ".obj" and file.read(len(BOM_UTF8)) == BOM_UTF8  # its first line would be lost
+        return BytesIO(file.read()) if marked else None
+
+
+def _bytes_of_stl(path: Path) -> int | None:
+    """How many bytes a binary STL has by its own count of triangles; None for other files."""
+    with path.open("rb") as file:
+        head = file.read(512)
+    # some binary ones begin with "solid" too
+    text = head.lstrip()[:5].lower() == b"solid" and b"\0" not in head
+    if path.suffix.lower() != ".stl" or len(head) < 84 or text:
+        return None
+    return 84 + 50 * int.from_bytes(head[80:84], "little")
 
 
 def _unreadable(path: Path, error: Exception) -> FileFormatError:

@@ -5,13 +5,15 @@ Four kinds of contradictions hold for all values of the other joints: two holds 
 placements; a fixed group that penetrates something that does not move; a range of motion or a reach cone that joints
 which cannot turn violate, wherever the others turn; and a goal for a point of a fixed group at a different position.
 
-A goal inside of something that does not move is unreachable if the point that is to reach it lies inside a piece: then
-the point stays outside by the clearance, and the error is at least the clearance plus the goal's depth.
+A goal for a point that joints of rotation and bounded slides carry from a fixed group is unreachable beyond the sum of
+their distances from each other. A goal inside of something that does not move is unreachable if the point that is to
+reach it lies inside a piece: then the point stays outside by the clearance, and the error is at least the clearance
+plus the goal's depth.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Literal, NamedTuple
 
 import coal
@@ -57,9 +59,10 @@ def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradictio
     finder.holds()
     finder.pairs()
     finder.ranges()
+    finder.goals_beyond()  # before goals fix groups too
     finder.goals()
     finder.goals_inside()
-    return tuple(finder.found)
+    return (*finder.found, *finder.missed.values())
 
 
 class _Finder:
@@ -68,6 +71,7 @@ class _Finder:
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._problem, self._workspace = problem, workspace
         self.found: list[Contradiction] = []
+        self.missed: dict[int, Contradiction] = {}  # number of a goal to what leaves the largest error of it
         state = workspace.state.update(problem.start)
         model = problem.scene.model
         frozen = np.zeros(model.nv, dtype=bool)
@@ -197,17 +201,41 @@ class _Finder:
                         self._report("unreachable", name, abs(float(apart)), 0.0, its_name)
                 points.append((group, place, wanted, name))
 
+    def _wanted(self) -> Iterator[tuple[int, str, Place, Array, Array]]:
+        """Number, name and frame of each goal for a point; its places (3,) in its joint, and wanted in the world."""
+        for number, goal in enumerate(self._problem.goals):
+            if isinstance(goal, (Point, Frame)):
+                name = f"goals[{number}], {type(goal).__name__}({goal.frame!r})"
+                if isinstance(goal, Point):
+                    here = goal.place.placement.act(goal.resolved_offset)
+                    yield number, name, goal.place, here, goal.resolved_target
+                else:
+                    place, wanted = goal.residual.place, goal.residual.placement.translation
+                    yield number, name, place, place.placement.translation, wanted
+
+    def goals_beyond(self) -> None:
+        """Find goals for points farther away than their joints are from each other, all in one line."""
+        model = self._problem.scene.model
+        for number, name, place, here, wanted in self._wanted():
+            joint, longest = place.joint, float(np.linalg.norm(here))
+            while self._group[joint] not in self._fixed:
+                longest += _travel(model, joint)
+                parent = model.parents[joint]
+                if self._group[parent] in self._fixed:
+                    root = (
+                        self._fixed[self._group[parent]].placement * self._local(parent) * model.jointPlacements[joint]
+                    )
+                    beyond = float(np.linalg.norm(wanted - root.translation)) - longest
+                    if beyond > CLEAR:
+                        text = f"{name}, is {1e3 * beyond:.3g} mm beyond the reach of its joints in one line"
+                        self.missed[number] = Contradiction("unreachable", text, beyond)
+                longest += float(np.linalg.norm(model.jointPlacements[joint].translation))
+                joint = parent
+
     def goals_inside(self) -> None:
         """Find goals for points inside of things that the points' own piece must not penetrate."""
         table, geometry = self._workspace.table, self._workspace.geometry
-        for number, goal in enumerate(self._problem.goals):
-            if not isinstance(goal, (Point, Frame)):
-                continue
-            found = goal.place if isinstance(goal, Point) else goal.residual.place
-            if isinstance(goal, Point):
-                here, wanted = found.placement.act(goal.resolved_offset), goal.resolved_target
-            else:
-                here, wanted = found.placement.translation, goal.residual.placement.translation
+        for number, name, found, here, wanted in self._wanted():
             own = [k for k in np.flatnonzero(table.joint == found.joint).tolist() if self._depth(k, here) > -ON_SURFACE]
             pairs = np.isin(table.pairs, own).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
             deepest, thing = 0.0, -1
@@ -219,10 +247,9 @@ class _Finder:
                     depth = self._depth(other, wanted)
                     if depth > CLEAR and depth + self._problem.clearances[pair] > deepest:
                         deepest, thing = depth + float(self._problem.clearances[pair]), other
-            if thing >= 0:
-                name = f"goals[{number}], {type(goal).__name__}({goal.frame!r})"
+            if thing >= 0 and (number not in self.missed or deepest > self.missed[number].least):
                 text = f"{name}, is in {self._workspace.owners[thing]}, {1e3 * deepest:.3g} mm from where it can be"
-                self.found.append(Contradiction("unreachable", text, deepest))
+                self.missed[number] = Contradiction("unreachable", text, deepest)
 
     def _depth(self, index: int, point: Array) -> float:
         """Depth of a point (3,) inside a piece, metres, both in the frame of the piece's joint."""
@@ -276,6 +303,17 @@ class _Finder:
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
         return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are required" if asked else "")
+
+
+def _travel(model: pin.Model, joint: int) -> float:
+    """How far a joint moves its own origin from where its parent carries it, metres; infinite where it is not known."""
+    kind = model.joints[joint].shortname()
+    if kind.startswith(("JointModelR", "JointModelSpherical")):
+        return 0.0
+    if kind.startswith("JointModelP") and model.nvs[joint] == 1:
+        place = model.idx_qs[joint]
+        return float(max(abs(model.lowerPositionLimit[place]), abs(model.upperPositionLimit[place])))
+    return np.inf
 
 
 def in_words(found: tuple[Contradiction, ...]) -> str:

@@ -35,9 +35,7 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze
 from wholebody.tasks.base import Bound
 
-METHODS: Mapping[str, str] = MappingProxyType(
-    {"trajectory": "Trajectory", "frames": "PerFrame", "bisection": "Bisection"}
-)
+METHODS: Mapping[str, str] = MappingProxyType({"trajectory": "Trajectory", "bisection": "Bisection"})
 """Methods by name: the classes of their settings in `wholebody.motion`."""
 
 
@@ -76,7 +74,7 @@ def avoid(
     Args:
         clip: the original postures; they may collide and be beyond limits.
         scene: its figure with carried things, and the things around; None for the figure alone.
-        method: "trajectory", "frames", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
+        method: "trajectory", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless

@@ -1,17 +1,16 @@
-"""Loads of a clip before and after a change: what is beyond strength or support, in words and in a chart."""
+"""Loads of a clip before and after a change: what is beyond strength or support, in words and as curves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.lib.stride_tricks import sliding_window_view
 
 from wholebody.base.arrays import Array, Mask, brief
-from wholebody.base.charts import new_chart, plain
 from wholebody.motion.clip_torques import Torques
 
 TORQUE = 0.02
@@ -99,31 +98,6 @@ class LoadChange:
                 f"{int((self.farther > PLACE).sum())} frames; {self._support(frame)}"
             )
         return said
-
-    def plot(self) -> Any:
-        """Draw the curves of `load_curves` over time, a matplotlib figure.
-
-        What was before is dashed, at the times of the answer's frames.
-        """
-        chart, (axes,) = new_chart(1, 3, (12.0, 2.8))
-        columns = telling((self.before, self.after))
-        for loads, style, times in (
-            (self.before, "--", np.interp(np.arange(len(self.before.torque)), self.times, np.arange(len(self.times)))),
-            (self.after, "-", np.arange(len(self.times))),
-        ):
-            for axis, drawn in zip(axes, load_curves(loads, columns), strict=True):
-                axis.set(xlabel="time [s]", ylabel=f"{drawn.title} [{drawn.unit}]")
-                for number, (name, values) in enumerate(drawn.lines):
-                    axis.plot(
-                        times * self.after.dt, values, style, color=f"C{number}",
-                        label=plain(name) if style == "-" else None,
-                    )  # fmt: skip
-        for axis in axes[:2]:
-            if axis.lines:
-                axis.legend(fontsize="x-small")
-        axes[0].set_title("dashed: before", fontsize="small", loc="left")
-        axes[2].set_ylim(0.0, max(1.0, 1.05 * axes[2].get_ylim()[1]))
-        return chart
 
     def _torque_missed(self, joint: int) -> str:
         old, (lower, upper), now = self.before, self.bounds, self.after.torque[:, joint]

@@ -41,7 +41,6 @@ from wholebody.scene.workspace import Workspace
 FIRST, FREE, FORWARD, SWEEP = 60, 2, 3, 1
 EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
-JUMP = 0.5  # rad, m: postures of neighbouring frames that are farther apart were found otherwise
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
@@ -106,7 +105,7 @@ class Run:
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
         self._stages: list[tuple[Callable[[int], None], int]] = [
-            (self._fit, 0), (self._slowed, self.every + self.slowing), (self._evened, len(self.even) // 2),
+            (self._fit, 0), (self._slowed, self.slowing), (self._evened, len(self.even) // 2),
             (self._calmed, len(self.calm) // 2),
         ] if free is None else [(self._known, 0)]  # fmt: skip
         if holds is None:
@@ -192,30 +191,13 @@ class Run:
         return alone if alone[1] < WORTH * best[1] else best
 
     def _fit(self, k: int) -> None:
-        """The free posture of a frame, from that before; the frames before follow one that was found otherwise."""
+        """The free posture of a frame, from that before."""
         near = self._chain[k - 1][0] if k else None
         best = self._fitted(k, near, k % self.every == 0)
         other = self._backward.pop(k, None)
         if other is not None and other[1] < WORTH * best[1]:
             best = other
         self._chain[k] = best
-        if near is not None and float(np.abs(pin.difference(self.model, near, best[0])).max()) > JUMP:
-            self._led_back(k)
-
-    def _led_back(self, k: int) -> None:
-        """Follow a better posture of a frame backward; the frames before take it over where it costs least."""
-        first, back = max(0, k - self.every), {k: self._chain[k]}
-        for j in range(k - 1, first - 1, -1):
-            back[j] = self.fitter.descend(back[j + 1][0], self._goals(j, self.upright, self.stay), FREE)
-        least, start = (sum(each[1] for each in back.values()), 0) if first == 0 else (np.inf, k)
-        for j in range(first + 1, k + 1):
-            # beside the costs of both, 0.05 m² for a difference of one radian between neighbours
-            way = pin.difference(self.model, self._chain[j - 1][0], back[j][0])
-            costs = [self._chain[i][1] if i < j else back[i][1] for i in range(first, k + 1)]
-            total = sum(costs) + 0.05 * float(way @ way)
-            if total < least:
-                least, start = total, j
-        self._chain |= {j: back[j] for j in range(start, k + 1)}
 
     def _slowed(self, k: int) -> None:
         """The free posture within speed limits: the middle between what keeps to them forward and backward in time."""

@@ -14,6 +14,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.methods.base import TIME_LIMIT, check_problem
+from wholebody.methods.contradictions import contradictions
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
 from wholebody.methods.starts import all_found, throughout
@@ -31,9 +32,10 @@ class Solutions(Sequence[Solution]):
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
         complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof;
-            of an arm of six joints with a closed form, whether all of its branches were descended from. Never where
-            neighbours of an answer meet the goals, as those of redundant arms and of people do, and else only after
-            40 descents.
+            of an arm of six joints with a closed form, whether all of its branches were descended from. True without a
+            start where the problem is proven to have no answer, as beyond an arm's length. Else never where
+            neighbours of an answer meet the goals, as those of redundant arms and of people do, and only after 40
+            descents.
 
     Examples:
         >>> found = wb.solutions(problem, most=2, starts=4)
@@ -103,6 +105,9 @@ def solutions(
     apart = checks.number(apart, "solutions: apart", 1e-6, 100.0, "rad or m")
     seed = checks.whole(seed, "solutions: seed", 0, 2**32 - 1)
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
+    with problem.borrow() as workspace:
+        if contradictions(problem, workspace):
+            return Solutions((), 0, 0, 0, True)
     known: list[Solution] = []
     begun = descents = 0
     branches, complete = _branches(problem), False

@@ -240,6 +240,7 @@ class Part:
 
 
 TEXT = Value("text", _text)
+LINE = Value("text", text)  # which is shown
 FLAG = Value("true or false", flag)
 COLOR = Value(
     'red, green, blue and, if given, alpha, each from 0 to 1; a name such as "steelblue"; or "#rrggbb"', color

@@ -24,6 +24,7 @@ from wholebody.taskfile.kinds import (
     FLAG,
     FRAME,
     GROUP,
+    LINE,
     PLACEMENT,
     POSITION,
     SEGMENT,
@@ -213,7 +214,7 @@ _BODY = _keys(
 )
 
 TOP = _keys(
-    title=TEXT,
+    title=LINE,
     clearance=number(CLEARANCE),
     touching=Several(Several(TEXT, 2), example='[["right_hand", "table"]]'),
     range_of_motion=FLAG,

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from wholebody import tasks
 from wholebody.base import files
-from wholebody.base.checks import instance, shown
+from wholebody.base.checks import instance, text
 from wholebody.base.errors import InputError
 from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
@@ -51,8 +51,8 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     if isinstance(problem, Scene):
         problem = Problem(problem)
     instance(problem, Problem, "write_task: problem", "give a problem or a scene")
-    if title is not None and (not isinstance(title, str) or not title.strip()):
-        raise InputError(f"write_task: title is {shown(title)}; give one line of text")
+    if title is not None:
+        text(title, "write_task: title")
     scene, beside = problem.scene, dict[Path, str]()
     top: dict[str, Any] = {"title": title or title_of(target)}
     if problem.clearance:
@@ -73,8 +73,8 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
         if problem.measures and all(isinstance(term, tasks.Soft) for term in problem.measures):
             raise InputError("write_task: measures are all Soft, and a file would have the usual ones too; add another")
         parts += [_measure(term, n) for n, term in enumerate(problem.measures)]
-    for file, text in beside.items():
-        files.write(file, text)
+    for file, written in beside.items():
+        files.write(file, written)
     return files.write(target, "\n".join(parts))
 
 

@@ -6,7 +6,6 @@ from wholebody.tracking.dragging import (
     judge_drag as judge_drag,
 )
 from wholebody.tracking.frame import Frame as Frame
-from wholebody.tracking.inner_paths import resampled as resampled
 from wholebody.tracking.loop import FrameLoop as FrameLoop, follow as follow
 from wholebody.tracking.path_following import (
     circle as circle,

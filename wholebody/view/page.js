@@ -7,6 +7,10 @@
   const viewer = new MeshCat.Viewer(pane, pane.dataset.still === undefined); // a page for pictures draws when asked to
   const handle_meshcat = viewer.handle_command.bind(viewer);
   const labels = new Map();
+  // What faces away from the sun has no light of it, in shadow or not: only the rest asks for the 16 depths around it.
+  const light = THREE.ShaderChunk.lights_fragment_begin;
+  THREE.ShaderChunk.lights_fragment_begin = light.replace("all( bvec2( directLight.visible, receiveShadow ) ) ? getShadow( d",
+    "receiveShadow && dot( geometry.normal, directLight.direction ) > 0.0 ? getShadow( d");
   const page = { ready: false, seek: seek, play: play, bytes: bytes, resize: resize, capture: capture };
   window.viewer = viewer;
   window.wholebody = page;

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -69,12 +70,39 @@ def test_no_state_of_an_srdf_is_lost(tmp_path: Path) -> None:
     assert "SRDF: state 'arm/home' is there twice; the last one is kept" in figure.notes
 
 
+def test_a_state_is_within_limits_but_where_the_file_says_otherwise(tmp_path: Path) -> None:
+    urdf, srdf = files(tmp_path, SRDF.replace('"j3" value="-0.4"', '"j4" value="2.5"'))
+    urdf.write_text(urdf.read_text().replace('lower="-2"', 'lower="0.05"'))
+    figure = wb.load(urdf, srdf=srdf)
+    values = figure.joint_values(figure.posture("home"))
+    assert (values["j1"], values["j2"], values["j3"], values["j4"]) == pytest.approx((0.5, 0.05, 0.0, 2.5))
+    assert [note for note in figure.notes if "limits" in note] == [
+        "SRDF: state 'home' puts the joint 'j4' beyond its limits"
+    ]
+
+
+def test_the_place_of_a_free_root_is_that_of_pinocchio(tmp_path: Path) -> None:
+    root = '<joint name="root_joint" value="0.1 0.2 0.3 0 0 0.6 0.8"/>'
+    urdf, srdf = files(tmp_path, SRDF.replace('<joint name="j1" value="0.5"/>', root))
+    figure = wb.load(urdf, srdf=srdf, root="free")
+    model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+    pin.loadReferenceConfigurations(model, str(srdf), False)
+    assert figure.posture("home") == pytest.approx(model.referenceConfigurations["home"], abs=1e-12)
+    assert wb.load(urdf, srdf=srdf).posture("home") == pytest.approx(figure.posture("home")[7:])
+    srdf.write_text(srdf.read_text().replace("0.6 0.8", "0.6 0.7"))
+    with pytest.raises(FileFormatError, match=r"'root_joint': .*quaternion"):
+        wb.load(urdf, srdf=srdf, root="free")
+
+
 def test_a_wrong_srdf_is_one_sentence(tmp_path: Path) -> None:
     urdf, srdf = files(tmp_path, SRDF.replace('value="0.5"', 'value="0,5"'))
     with pytest.raises(FileFormatError, match=r"state 'home': joint 'j1': .*'0,5'"):
         wb.load(urdf, srdf=srdf)
     srdf.write_text("<mujoco/>")
     with pytest.raises(FileFormatError, match="give an SRDF"):
+        wb.load(urdf, srdf=srdf)
+    srdf.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="arm.xacro"/></robot>')
+    with pytest.raises(FileFormatError, match=r"`xacro r\.srdf > robot\.srdf`"):
         wb.load(urdf, srdf=srdf)
     with pytest.raises(FileFormatError, match=r"gone\.srdf"):
         wb.load(urdf, srdf=tmp_path / "gone.srdf")

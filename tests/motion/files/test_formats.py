@@ -404,6 +404,21 @@ def test_an_archive_of_amass_stands_upright_and_faces_forward(tmp_path: Path, hu
     np.testing.assert_array_equal(shaped.positions, motion.positions)
 
 
+@pytest.mark.parametrize(("columns", "model", "down"), [(72, None, 0.22), (156, "smplh", 0.22), (165, None, 0.35)])
+def test_a_body_of_amass_turns_about_its_pelvis_beside_the_place_of_the_archive(
+    tmp_path: Path, columns: int, model: str | None, down: float
+) -> None:
+    """SMPL adds `trans` to vertices that turned about the pelvis, which is 22 cm below the template's origin."""
+    poses = np.zeros((7, columns))
+    poses[:, :3] = np.linspace(0.0, np.pi / 2, 7)[:, None] * [1.0, 0.0, 0.0]
+    archive = amass(tmp_path / "a.npz", poses=poses, trans=np.zeros((7, 3)), surface_model_type=model)
+    motion = wb.motion.read_skeleton(archive)
+    pelvis = motion.positions[:, motion.names.index("pelvis")]
+    np.testing.assert_allclose(pelvis, np.tile([0.0, -down, 0.02], (7, 1)), atol=0.01)
+    named = amass(tmp_path / "b.npz", poses=poses[:, :66], trans=np.zeros((7, 3)), surface_model_type="smplx")
+    assert wb.motion.read_skeleton(named).positions[0, 0, 1] == pytest.approx(-0.35, abs=0.01)
+
+
 class Unpacked:
     """An object that must not come to life."""
 

@@ -16,7 +16,7 @@ from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import is_file
 from wholebody.figures.link_pieces import Color, LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
-from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_xml, unique_names
+from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_robot, unique_names
 from wholebody.geometry.pieces import LARGEST
 
 EXTENSION = "wholebody"
@@ -48,13 +48,7 @@ class UrdfFile(NamedTuple):
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     """Read and check a URDF file; `find_mesh` looks in the folders."""
-    robot = read_xml(path, "URDF")
-    if robot.tag != "robot":
-        raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give a URDF")
-    if path.suffix == ".xacro" or robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
-        raise FileFormatError(
-            f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.urdf`"
-        )
+    robot = read_robot(path, "URDF")
     links = unique_names(robot.findall("link"), "link", path)
     if not links:
         raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")

@@ -13,13 +13,17 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.urdf.xml_reading import numbers, read_xml
+from wholebody.figures.description import ROOT_JOINT, zero_within_limits
+from wholebody.figures.urdf.xml_reading import bounded, numbers, read_robot
+from wholebody.geometry.placement import FARTHEST
 
 READ = {
     *("group", "group_state", "disable_collisions", "enable_collisions", "disable_default_collisions"),
     "end_effector",  # a name for a group
 }
 """Elements that are read."""
+
+ROUNDED = 1e-3  # rad, m: files round the values of states, such as 1.5707, and the limits that they are at
 
 
 class Srdf(NamedTuple):
@@ -34,9 +38,7 @@ class Srdf(NamedTuple):
 
 def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
     """Read the SRDF of a URDF that has a model and links."""
-    robot = read_xml(path, "SRDF")
-    if robot.tag != "robot":
-        raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give an SRDF")
+    robot = read_robot(path, "SRDF")
     reader = _Reader(path, robot, model, links)
     unknown = sorted({str(part.tag) for part in robot if isinstance(part.tag, str)} - READ)
     if unknown:
@@ -52,6 +54,8 @@ class _Reader:
         self._path, self._robot, self._model, self._links = path, robot, model, links
         self.groups = {str(group.get("name")): group for group in robot.findall("group")}
         self._virtual = {str(joint.get("name")) for joint in robot.findall("virtual_joint")}
+        # Pinocchio's name of a free root stands in files that have no virtual joint
+        self._roots = {ROOT_JOINT, *self._virtual} if model.existJointName(ROOT_JOINT) else set()
         self.notes: list[str] = []
         self._movable = {
             name: index
@@ -84,26 +88,35 @@ class _Reader:
         return tuple(sorted(found, key=self._movable.__getitem__))
 
     def postures(self) -> dict[str, Array]:
-        """Named states as postures; joints of no state are neutral."""
+        """Named states as postures; joints that a state does not name are at zero, or at the limit nearest to it."""
         elements = self._robot.findall("group_state")
         names = [str(state.get("name")) for state in elements]
         found: dict[str, Array] = {}
         for state, name in zip(elements, names, strict=True):
-            q: Array = pin.neutral(self._model)
+            q = zero_within_limits(self._model)
             for joint in state.findall("joint"):
                 known = str(joint.get("name"))
+                place = f"{self._path}: state {shown(name)}: joint {shown(known)}"
+                if known in self._roots:
+                    q[:7] = _free_placement(joint, place)
+                    continue
                 if known not in self._movable:
                     self.notes.append(f"SRDF: state {shown(name)} names the joint {shown(known)}, which does not move")
                     continue
-                place = f"{self._path}: state {shown(name)}: joint {shown(known)}"
                 (value,) = numbers(joint, "value", place, 1)
                 made = self._model.joints[self._movable[known]]
+                if made.nq == 1 and not self._within(made.idx_q, value):
+                    self.notes.append(f"SRDF: state {shown(name)} puts the joint {shown(known)} beyond its limits")
                 q[made.idx_q : made.idx_q + made.nq] = (value,) if made.nq == 1 else (np.cos(value), np.sin(value))
             called = name if names.count(name) == 1 else f"{state.get('group')}/{name}"
             if called in found:
                 self.notes.append(f"SRDF: state {shown(called)} is there twice; the last one is kept")
             found[called] = q
         return found
+
+    def _within(self, place: int, value: float) -> bool:
+        least, most = self._model.lowerPositionLimit[place], self._model.upperPositionLimit[place]
+        return bool(least - ROUNDED <= value <= most + ROUNDED)
 
     def disabled(self) -> dict[frozenset[str], str]:
         """Pairs of links that are not tested."""
@@ -137,3 +150,14 @@ class _Reader:
 
     def _carrier(self, link: str) -> int:
         return int(self._model.frames[self._model.getFrameId(link, pin.FrameType.BODY)].parentJoint)
+
+
+def _free_placement(joint: Element, place: str) -> Array:
+    """Position and quaternion (7,) x y z, x y z w of a free root, as MoveIt and Pinocchio order them."""
+    found = np.array(bounded(joint, "value", place, 7, most=FARTHEST))
+    length = float(np.linalg.norm(found[3:]))
+    if not abs(length - 1.0) < 1e-2:
+        said = "the last four are a quaternion x y z w"
+        raise FileFormatError(f"{place}: {said}, whose length is {length:g}; give one of length 1")
+    found[3:] /= length
+    return found

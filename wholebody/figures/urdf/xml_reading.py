@@ -36,6 +36,19 @@ def read_xml(path: Path, kind: str) -> Element:
         ) from None
 
 
+def read_robot(path: Path, kind: str) -> Element:
+    """Return the `<robot>` of a "URDF" or an "SRDF"."""
+    robot = read_xml(path, kind)
+    if robot.tag != "robot":
+        article = "an" if kind == "SRDF" else "a"
+        raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give {article} {kind}")
+    if path.suffix == ".xacro" or robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
+        raise FileFormatError(
+            f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.{kind.lower()}`"
+        )
+    return robot
+
+
 def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[str, ...]:
     """Return the names of elements; one without a name, or two of one name, are refused by a `FileFormatError`."""
     names: dict[str, None] = {}

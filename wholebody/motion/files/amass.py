@@ -25,6 +25,9 @@ BODY = 22
 TEMPLATE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """From the template's axes into those of a body that faces x: z forward to x, x left to y, y up to z."""
 
+PELVIS = {"smpl": (-0.002, -0.223, 0.028), "smplx": (0.003, -0.351, 0.012)}
+"""Pelvis of an average body in the template's axes, metres: `trans` moves the origin of these, which turns do not."""
+
 
 def read_motion(path: Path, _unit: str | None = None, _up: str | None = None) -> SkeletonMotion | None:
     """Read the body of an AMASS archive, in metres with z up; None of another archive."""
@@ -33,6 +36,7 @@ def read_motion(path: Path, _unit: str | None = None, _up: str | None = None) ->
         return None
     poses, places, frequency = _arrays(name, arrays)
     frames = len(poses)
+    whole = str(arrays.get("surface_model_type", "")).lower() == "smplx" or poses.shape[1] == 3 * 55
     bones = packaged_table(Path(__file__).parents[1] / "data" / "smpl.csv")
     names = tuple(bone["joint"] for bone in bones)
     offsets = np.array([[float(bone[axis]) for axis in "xyz"] for bone in bones])
@@ -44,7 +48,8 @@ def read_motion(path: Path, _unit: str | None = None, _up: str | None = None) ->
     parents = np.array([names.index(bone["parent"]) if bone["parent"] else -1 for bone in bones], dtype=np.intp)
     try:
         return SkeletonMotion.moved(
-            names, parents, offsets @ TEMPLATE.T, local, places, 1.0 / frequency, title_of(path),
+            names, parents, offsets @ TEMPLATE.T, local, places + PELVIS["smplx" if whole else "smpl"],
+            1.0 / frequency, title_of(path),
             ("lengths of bones are those of an average body",),
         )  # fmt: skip
     except InputError as error:

@@ -1,4 +1,4 @@
-"""The method "frames": what holds in one frame does not hold in the next one, and a foot passes the one that stands."""
+"""What follows the original postures: what holds in one frame does not hold in the next one."""
 
 from __future__ import annotations
 
@@ -22,16 +22,3 @@ def test_a_foot_is_free_again_in_the_frame_after_its_stand(planar_arm: Callable[
     follower = Follower(terms, 0.0, Work())
     np.testing.assert_allclose(follower.frame(0, q[0] + 0.1), q[0], atol=1e-3)
     np.testing.assert_allclose(follower.frame(1, q[0]), q[1], atol=2e-3)
-
-
-def test_a_free_motion_beside_a_stand_that_ends_is_followed_without_lag(planar_arm: Callable[..., Figure]) -> None:
-    """An arm presses into a block for some frames, and then leaves it fast."""
-    figure = planar_arm((0.5, 0.5), radius=0.02)
-    scene = wb.Scene(figure)
-    scene.add(wb.Box((0.4, 0.1, 0.4)), name="block", at=(0.8, -0.12, 0.0))
-    angle = np.concatenate([np.linspace(0.3, -0.12, 12), np.linspace(-0.12, 1.2, 8)[1:]])
-    clip = wb.Clip(figure, np.stack([angle, np.zeros(len(angle))], axis=1), DT)
-    found = wb.avoid(clip, scene, method="frames")
-    assert found.report.before.colliding >= 2
-    assert found.report.solved, found.report.message
-    assert np.abs(found.clip.q - clip.q)[-3:].max() < 2e-3
