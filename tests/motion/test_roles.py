@@ -210,6 +210,23 @@ def test_a_small_robot_with_a_stiff_trunk_is_known_by_its_axes(ahead: int, tmp_p
     assert left == pytest.approx([0.0, 0.2, 0.3])
 
 
+def test_a_robot_of_legs_alone_is_known_where_it_walks(tmp_path: Path) -> None:
+    """Numbered joints of two legs; what stands in the world on them is no walker, and what hangs upward has no legs."""
+    for down in (-1.0, 1.0):
+        links = []
+        for side, sign in (("L", 1), ("R", -1)):
+            links += [("base", f"{side}1", (0, 0.1 * sign, 0), 0.02, "x"), (f"{side}1", f"{side}2", (0,) * 3, 0.1, "y")]
+            links += [
+                (f"{side}2", f"{side}3", (0, 0, 0.3 * down), 0.1, "y"),
+                (f"{side}3", f"{side}4", (0, 0, 0.3 * down), 0.05, "y"),
+            ]
+        figure = robot(tmp_path, links)
+        legs = {"hip": 2, "knee": 3, "ankle": 4}
+        known = {f"{side}_{part}": f"{side[0].upper()}{k}_j" for side in ("left", "right") for part, k in legs.items()}
+        assert built_figure(figure) == (known if down < 0.0 else {})
+        assert built_figure(wb.load(tmp_path / "robot.urdf")) == {}
+
+
 def test_a_quadruped_is_no_person(tmp_path: Path) -> None:
     """Four limbs alike that hang from a level trunk; RR of its names is no right hip alone."""
     links = []

@@ -40,8 +40,8 @@ class _Limb(NamedTuple):
         return sum(self.bones)
 
 
-def limb_pairs(parents: Indices, offsets: Array) -> tuple[tuple[int, _Limb, _Limb], ...]:
-    """Legs and arms: the joint from which the pair goes on, and both limbs; empty where the skeleton is no person's."""
+def limb_pairs(parents: Indices, offsets: Array, least: int = 2) -> tuple[tuple[int, _Limb, _Limb], ...]:
+    """Legs and arms: the joint from which the pair goes on, and both limbs; empty for fewer than `least` pairs."""
     lengths = np.linalg.norm(offsets, axis=1)
     children: list[list[int]] = [[] for _ in parents]
     reach = lengths.copy()
@@ -62,10 +62,10 @@ def limb_pairs(parents: Indices, offsets: Array) -> tuple[tuple[int, _Limb, _Lim
                 taken += one, other
                 found.append((joint, one, other))
     found = sorted(found, key=lambda pair: pair[1].length + pair[2].length, reverse=True)[:2]
-    if len(found) < 2:
+    if len(found) < least:
         return ()
     ratios = [
-        found[0][1].length / found[1][1].length,
+        found[0][1].length / found[-1][1].length,
         *(max(limb.bones) / min(limb.bones) for _, *pair in found for limb in pair),
     ]
     inside = any(joint in limb.joints for joint, *_ in found for _, *pair in found for limb in pair)
@@ -90,19 +90,23 @@ def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -
 
 
 def built(motion: SkeletonMotion, stands: bool = False) -> dict[str, str]:
-    """Role to joint of a skeleton by its structure; empty where it is no person's. What `stands` has its legs below."""
-    pairs = limb_pairs(motion.parents, motion.offsets)
+    """Role to joint of a skeleton by its structure; empty where it is no person's.
+
+    What `stands` has its legs below, and may have no arms.
+    """
+    pairs = limb_pairs(motion.parents, motion.offsets, 1 if stands else 2)
     if not pairs:
         return {}
     if stands:
         pairs = tuple(sorted(pairs, key=lambda pair: float(motion.positions[0, pair[1].joints[-1], 2])))
     places = motion.positions[:: max(1, len(motion) // 50)]
-    (hips, *legs), (chest, *arms) = pairs
+    hips, *legs = pairs[0]
+    chest = pairs[-1][0]
     found = {"pelvis": hips} if hips == chest else {"pelvis": hips, "chest": chest}
-    for pair, parts in zip((legs, arms), LIMBS, strict=True):
+    for (_, *pair), parts in zip(pairs, LIMBS, strict=False):
         for side, limb in zip(("left", "right"), _sided(motion, places, pair, legs), strict=True):
             found |= {f"{side}_{part}": joint for part, joint in zip(parts, _parts(motion, limb), strict=False)}
-    taken = {joint for limb in (*legs, *arms) for joint in limb.joints}
+    taken = {joint for _, *pair in pairs for limb in pair for joint in limb.joints}
     while hips >= 0:  # from a chest that is the root a way leads down to the legs
         taken.add(hips)
         hips = int(motion.parents[hips])
@@ -227,18 +231,23 @@ def built_figure(figure: Figure) -> dict[str, str]:
     found = {role: numbers.index(name) for role, name in built(still, stands=True).items()}
     found = {role: k for role, k in found.items() if role.split("_")[-1] in PARTS}
     roles = {role: names[k].get(role.split("_")[-1], names[k][""]) for role, k in found.items()}
-    return roles if _is_person(roles, {role: places[k] for role, k in found.items()}) else {}
+    return roles if _is_person(roles, {role: places[k] for role, k in found.items()}, figure.root == "free") else {}
 
 
-def _is_person(joints: Mapping[str, str], places: Mapping[str, Array]) -> bool:
+def _is_person(joints: Mapping[str, str], places: Mapping[str, Array], walks: bool) -> bool:
     """Whether shoulders stand above hips, by their places (3,), and no joint but a forearm's has two roles.
 
-    Those of a quadruped are beside each other, and its legs end at their knees.
+    Those of a quadruped are beside each other, and its legs end at their knees. What `walks` may have legs alone, whose
+    hips stand above its ankles.
     """
-    if not {"left_hip", "right_hip", "left_shoulder", "right_shoulder"} <= places.keys():
+    arms = "left_shoulder" in places
+    if not {"left_hip", "left_ankle"} <= places.keys() or not (arms or walks):
         return False
-    hips, shoulders = (sum(places[f"{side}_{part}"] for side in ("left", "right")) for part in ("hip", "shoulder"))
-    trunk = np.asarray(shoulders - hips)
+    lower, upper = (
+        sum(places[f"{side}_{part}"] for side in ("left", "right"))
+        for part in (("hip", "shoulder") if arms else ("ankle", "hip"))
+    )
+    trunk = np.asarray(upper - lower)
     single = [joint for role, joint in joints.items() if not role.endswith("wrist")]
     return len(set(single)) == len(single) and bool(trunk[2] > UPRIGHT * np.linalg.norm(trunk))
 
