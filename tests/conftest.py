@@ -42,6 +42,8 @@ from wholebody.view import browser, screenshot
 from wholebody.view.browser import Browser
 from wholebody.view.viewer import Viewer
 
+gc.disable()  # until all is collected: looking through what is imported takes a sixth of that time
+
 ROOT = Path(__file__).resolve().parent.parent
 
 # A failure says how to repeat it. In CI, where CI is set, the examples are the same in every run.
@@ -304,7 +306,10 @@ def _serve_warm(connection: socket.socket, output: int, environment: Mapping[str
 class KeptBrowser(Browser):
     """A browser that is not ended when it is closed but serves the next one who starts one: to start takes seconds."""
 
-    idle: ClassVar[list[Browser]] = []
+    idle: ClassVar[list[KeptBrowser]] = []
+    asked = (
+        ""  # the page to open before anything else is done: most commands that begin to start a browser draw nothing
+    )
 
     @classmethod
     def start(cls, page: str = "") -> Browser:
@@ -312,14 +317,28 @@ class KeptBrowser(Browser):
         if not cls.idle or not browser.find_chromium():
             return cls(page=page)
         kept = cls.idle.pop()
-        if page:
-            kept.open_html(page)
+        kept.asked = page
         return kept
 
+    def _call(self, method: str, **params: Any) -> dict[str, Any]:
+        self._open_asked()
+        return super()._call(method, **params)
+
+    def _begin(self, expression: str) -> Callable[[], Any]:
+        self._open_asked()
+        return super()._begin(expression)
+
+    def _open_asked(self) -> None:
+        page, self.asked = self.asked, ""
+        if page:
+            self.open_html(page)
+
     def close(self) -> None:
-        """Empty the page, and keep the browser."""
+        """Empty the page, if one was opened, and keep the browser."""
+        unopened, self.asked = bool(self.asked), ""
         try:
-            self.open("about:blank", "true")
+            if not unopened:
+                self.open("about:blank", "true")
         except WholebodyError:
             super().close()
         else:

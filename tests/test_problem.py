@@ -324,3 +324,39 @@ def test_constraints_that_were_stated_before_at_this_start_are_those_of_their_ow
                 assert np.abs(held.value(scene.state(q))).max() < 1e-12
                 assert len(held.value(scene.state(q))) == 3 + 3 * turned
                 assert held.frame == frame
+
+
+def test_defaults_do_not_depend_on_what_was_stated_before(scene):
+    """Problems that differ in one thing alone, one after the other in one scene, and each in a scene of its own."""
+    feet, reach = [wb.Hold("left_foot"), wb.Hold("right_foot")], [GOAL]
+    lifted = scene.figure.posture("standing")
+    lifted[2] += 0.3
+    asked = [
+        {"goals": reach, "constraints": feet},
+        {"goals": [], "constraints": feet},
+        {"goals": [*reach, wb.Point("left_index_tip", (0.5, 0.2, 1.0))], "constraints": feet},
+        {"goals": [wb.Relative("left_palm", "right_palm")], "constraints": feet},
+        {"goals": reach, "constraints": feet[:1]},
+        {"goals": reach, "constraints": [feet[0], wb.Hold("right_foot", at=(0.3, -0.1, 0.08))]},
+        {"goals": reach, "constraints": [*feet, wb.Freeze("root")]},
+        {"goals": reach, "constraints": [wb.Stand("floor")]},
+        {"goals": reach, "constraints": [wb.Stand("floor"), wb.tasks.RangeOfMotion()]},
+        {"goals": reach, "constraints": feet, "start": lifted},
+        {"goals": reach, "constraints": feet, "start": "sitting"},
+        {"goals": reach, "constraints": feet, "balance": False},
+        {"goals": reach, "constraints": feet[:1], "balance": True},
+        {"goals": reach, "constraints": feet, "range_of_motion": False},
+        {"goals": reach, "constraints": feet, "measures": []},
+        {"goals": reach},
+        {"goals": reach, "start": "sitting"},
+    ]
+    other = scene.state(scene.figure.posture("t_pose"))
+
+    def told(scene, given):
+        problem = wb.Problem(scene, **given)
+        rows = [np.atleast_1d(one.value(other)).tolist() for one in (*problem.defaults, *problem.measures)]
+        return *_told(problem), problem.left_out, rows
+
+    alone = [told(wb.Scene(scene.figure).add(wb.HalfSpace(), name="floor"), given) for given in asked]
+    assert [told(scene, given) for given in asked + asked[::-1]] == alone + alone[::-1]
+    assert len({repr(one) for one in alone}) > 8

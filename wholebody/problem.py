@@ -23,7 +23,7 @@ from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import KINDS, check_frozen, check_own, checked_terms, owner_pair, start_posture
-from wholebody.tasks.defaults import alike, balancing, default_constraints, standing, usual_measures
+from wholebody.tasks.defaults import alike, seen, standing, usual_constraints, usual_measures
 from wholebody.tasks.inputs import once
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
@@ -149,27 +149,44 @@ class Problem(checks.FixedAttributes):
             _places=tuple([place for place, term in enumerate(given) if isinstance(term, Constraint)]),
             _plan=None,
         )
-        vars(self).update(constraints=(own := self._resolved([given[place] for place in self._places])), _joined=own)
+        own = self._resolved([given[place] for place in self._places])
+        vars(self).update(constraints=own, _joined=own)
         vars(self).update(self._by_default(self.goals))
-        if self.bounds or any(map(is_own, (*self.goals, *self.constraints, *self.measures))):
+        if self.bounds or any(map(is_own, (*self.goals, *self.stated, *(() if measured is None else self.measures)))):
             check_frozen(self.bounds, scene, state := scene.state(q))
             check_own(state, goals=self.goals, constraints=self.constraints, measures=self.measures)
         vars(self).update(clearances=self._clearances(self.goals))
 
     def _by_default(self, goals: tuple[Goal, ...]) -> dict[str, Any]:
         """Attributes that follow from the terms that were stated, with these resolved goals."""
-        scene, at, stated = self.scene, self._rest, self.stated
-        terms: list[Constraint | Goal] = [*stated, *goals]
-        stands = standing(scene, at, terms, self.bounds)
+        stated, measured, joined = self.stated, self.measures is self._usual, self.constraints is self._joined
+        make = partial(self._usual_terms, stated, goals, measured, joined)
+        if self.bounds or any(map(is_own, (*stated, *goals))):  # which may change
+            measures, (defaults, left_out) = make()
+        else:
+            asked = measured, joined, self.range_of_motion, self.balance
+            key = "defaults", asked, stated, tuple(map(seen, goals)), self._rest.tobytes()
+            measures, (defaults, left_out) = once(self.scene, key, make)
         found: dict[str, Any] = {"goals": goals, "_known": goals}
-        if self.measures is self._usual:
-            measures = usual_measures(scene, at, terms, self.bounds, stands, ranges=self.range_of_motion)
+        if measured:
             found.update(measures=measures, _usual=measures)
-        if self.constraints is self._joined:  # or constraints were set
-            defaults, left_out = self._usual_constraints(stated, stands)
+        if joined:
             constraints = self.constraints if defaults is self.defaults else (*stated, *defaults)
             found.update(constraints=constraints, _joined=constraints, defaults=defaults, left_out=left_out)
         return found
+
+    def _usual_terms(
+        self, stated: tuple[Constraint, ...], goals: tuple[Goal, ...], measured: bool, joined: bool
+    ) -> tuple[tuple[Measure, ...], tuple[tuple[Constraint, ...], str]]:
+        """The measures and the constraints by default of resolved terms; none of those that were stated or set."""
+        scene, at = self.scene, self._rest
+        terms: list[Constraint | Goal] = [*stated, *goals]
+        stands = standing(scene, at, terms, self.bounds)
+        ranges, balance = self.range_of_motion, self.balance
+        measures = usual_measures(scene, at, terms, self.bounds, stands, ranges=ranges) if measured else ()
+        if not joined:
+            return measures, ((), "")
+        return measures, usual_constraints(scene, at, stated, stands, ranges=ranges, balance=balance)
 
     def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
         """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
@@ -182,22 +199,6 @@ class Problem(checks.FixedAttributes):
         except TypeError:  # arrays and placements
             return tuple(found)
         return tuple(found) if any(map(is_own, terms)) else once(self.scene, key, partial(tuple, found))
-
-    def _usual_constraints(
-        self, stated: Sequence[Constraint], stands: tuple[str, ...]
-    ) -> tuple[tuple[Constraint, ...], str]:
-        scene, start, ranges = self.scene, self._rest, self.range_of_motion
-        if not (scene.figure.ranges or self.balance):
-            return (), ""  # no person
-        known = frozenset(map(type, stated))
-        steady = stands if self.balance is None else ()
-        steady = balancing(scene, stated) if (required := self.balance is True) else steady
-        if not (steady or (ranges and scene.figure.ranges)):
-            return (), ""
-        moves = bool(steady) * scene.built.moves  # shoes carry too
-        key = "constraints", ranges, steady, required, known, moves, start.tobytes() if steady else b""
-        make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
-        return scene.built.known(key, make)
 
     def _in_words(self) -> tuple[str, dict[str, list[str]]]:
         things, pairs = len(self.scene.objects), len(self.clearances)
@@ -374,15 +375,16 @@ class Problem(checks.FixedAttributes):
     def _clearances(self, goals: tuple[Goal, ...]) -> Array:
         """(pairs,) the clearance of each with these goals, as it follows from what was stated."""
         built = self.scene.built
+        if self.clearance == 0.0:  # which no pair has less than
+            return np.zeros(len(built.table.pairs))
         asked = np.empty(len(built.table.pairs))
         asked.fill(self.clearance)
         brought = [pair for term in (*goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
         if allowed:
             asked[built.known(("touching", allowed), partial(built.between, allowed))] = 0.0
-        if self.clearance > 0.0:  # else no distance that is kept is less
-            number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
-            asked[number] = np.minimum(asked[number], kept)
+        number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
+        asked[number] = np.minimum(asked[number], kept)
         return asked
 
     def _resting(self) -> tuple[Indices, Array]:

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -369,5 +370,7 @@ def test_a_cluster_that_does_not_answer_is_refused_even_for_one_case(
     command: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("distributed")
+    before = set(threading.enumerate())
     assert main([*command, "--cluster", "not an address"]) == 2
+    assert set(threading.enumerate()) <= before  # a client that is left as it is blocks the next one, now and then
     assert "no dask scheduler answers at not an address" in capsys.readouterr().err

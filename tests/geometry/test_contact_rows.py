@@ -84,13 +84,17 @@ def posed(scene, gap, rng):
     return q
 
 
-@pytest.mark.parametrize("gap", GAPS.values(), ids=GAPS.keys())
 @pytest.mark.parametrize(
     ("moving", "other"),
     [pair for pair in itertools.combinations_with_replacement(SHAPES, 2) if pair != ("half-space", "half-space")],
 )
-def test_witness_row_is_the_derivative_of_the_distance(free_bodies, moving, other, gap):
+def test_witness_row_is_the_derivative_of_the_distance(free_bodies, moving, other):
     """Central differences of coal's distance, root against a fixed object and two moving bodies."""
+    for gap in GAPS.values():
+        row_of_one_gap(free_bodies, moving, other, gap)
+
+
+def row_of_one_gap(free_bodies, moving, other, gap):
     rng = np.random.default_rng([*map(len, (moving, other)), int(1e5 * (gap + 1))])
     fixed = wb.Scene(free_bodies(SHAPES[moving])).add(SHAPES[other], name="thing", at=(0.1, -0.2, 0.05))
     scenes = [fixed] if other == "half-space" else [fixed, wb.Scene(free_bodies(SHAPES[moving], SHAPES[other]))]

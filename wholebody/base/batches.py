@@ -206,10 +206,25 @@ def _client(address: str) -> AbstractContextManager[Any]:
         from distributed import Client
     except ImportError:
         raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
-    connect: Callable[..., AbstractContextManager[Any]] = Client
+
+    class Closed(Client):  # type: ignore[misc]
+        """A client that closes itself where it cannot start.
+
+        Left to the garbage collector, one whose address is wrong closes itself in any thread at any time: in that of
+        the next client's loop it blocks the start of that client, and at the end of Python it waits for 20 s.
+        """
+
+        def start(self, **options: Any) -> None:
+            try:
+                super().start(**options)
+            except BaseException:
+                self.close()
+                raise
+
+    connect: Callable[..., AbstractContextManager[Any]] = Closed
     try:
         return connect(address, timeout=10.0)  # s: for which a scheduler is waited for
-    except (OSError, ValueError) as error:
+    except (OSError, TypeError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
 
 

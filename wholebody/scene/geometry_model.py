@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 from threading import Lock
@@ -166,8 +165,10 @@ class SceneGeometry:
                 if len(self._known) > 64:
                     self._known.popitem(last=False)
             return found
-        with suppress(KeyError):  # another thread has just made room
+        try:  # noqa: SIM105 # a context takes longer than to find what is known
             self._known.move_to_end(key)
+        except KeyError:  # another thread has just made room
+            pass
         return found
 
     def between(self, owners: Set[tuple[str, str]]) -> Mask:

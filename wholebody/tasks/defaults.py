@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Hashable, Sequence, Set
 from functools import partial
 
 import numpy as np
@@ -141,11 +141,16 @@ def _placed(term: Constraint | Goal) -> tuple[int, ...]:
     return tuple([one.joint for one in known if type(one) is inputs.Place])
 
 
+def seen(goal: Goal) -> Hashable:
+    """What the defaults of a problem depend on of a resolved goal: all but its target where it places frames."""
+    placed = _placed(goal)
+    return (type(goal), placed) if placed else goal
+
+
 def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
     """Whether resolved goals differ in their targets alone, as far as the defaults of a problem depend on them."""
     return len(goals) == len(before) and all(
-        new is old or (type(new) is type(old) and bool(placed := _placed(new)) and placed == _placed(old))
-        for new, old in zip(goals, before, strict=True)
+        new is old or seen(new) == seen(old) for new, old in zip(goals, before, strict=True)
     )
 
 
@@ -180,6 +185,28 @@ def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:
             heading = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
             q[root + 2 : root + 7] = kneeling[root + 2], 0.0, 0.0, np.sin(heading), np.cos(heading)
     return np.asarray(q)
+
+
+def usual_constraints(
+    scene: Scene, start: Array, stated: Sequence[Constraint], stands: Sequence[str], *, ranges: bool,
+    balance: bool | None,
+) -> tuple[tuple[Constraint, ...], str]:  # fmt: skip
+    """The constraints that are added to resolved ones; the same ones of the same scene are known.
+
+    `stands` are the persons of `standing`, `ranges` and `balance` are as a problem takes them.
+    """
+    if not (scene.figure.ranges or balance):
+        return (), ""  # no person
+    known = frozenset(map(type, stated))
+    steady = stands if balance is None else ()
+    steady = balancing(scene, stated) if (required := balance is True) else steady
+    if not (steady or (ranges and scene.figure.ranges)):
+        return (), ""
+    moves = bool(steady) * scene.built.moves  # shoes carry too
+    key = "constraints", ranges, steady, required, known, moves, start.tobytes() if steady else b""
+    make = partial(default_constraints, scene, start, known, ranges=ranges, standing=steady, required=required)
+    found: tuple[tuple[Constraint, ...], str] = scene.built.known(key, make)
+    return found
 
 
 def default_constraints(

@@ -69,7 +69,7 @@ def test_two_arms_that_hold_one_bar_keep_it_where_it_is_in_both() -> None:
 def test_a_hand_at_a_point_turns_for_the_one_that_is_to_meet_it() -> None:
     figure, rng, solved = wb.load("avatar"), np.random.default_rng(3), 0
     scene, arms = wb.Scene(figure), figure.dofs([*figure.groups["left_arm"], *figure.groups["right_arm"]])
-    for _ in range(16):
+    for _ in range(8):
         bent = np.zeros(figure.model.nv)
         bent[arms] = rng.uniform(-0.5, 0.5, figure.model.nv)[arms]
         q = figure.clamp(pin.integrate(figure.model, figure.neutral, bent))
@@ -77,7 +77,7 @@ def test_a_hand_at_a_point_turns_for_the_one_that_is_to_meet_it() -> None:
         meet = wb.Relative("left_palm", "right_palm", tuple(right.actInv(left.translation)), orientation=False)
         goals = [meet, wb.Point("right_palm", right.translation)]
         solved += wb.solve(wb.Problem(scene, goals=goals, balance=False, range_of_motion=False), "ccd").solved
-    assert solved >= 10  # 8 where the second hand does not turn
+    assert solved >= 5  # 4 where the second hand does not turn
 
 
 @pytest.mark.parametrize(("kind", "coned"), [("point", False), ("frame", True)])

@@ -97,15 +97,14 @@ def test_what_is_reached_without_measures_does_not_depend_on_them():
     method = wb.methods.QP(measures=False, restarts=4)
     for at in ((0.6, -0.1, 1.25), (0.9, -0.1, 1.25)):  # behind the panel, and out of reach
         usual = method.solve(behind_a_panel(at=at))
-        for measures in ([], [wb.tasks.Hang(weight=40.0), wb.tasks.Discomfort()]):
-            other = method.solve(behind_a_panel(measures, at))
-            assert other.status == usual.status
-            assert np.array_equal(other.q, usual.q)
+        other = method.solve(behind_a_panel([wb.tasks.Hang(weight=40.0), wb.tasks.Discomfort()], at))
+        assert other.status == usual.status
+        assert np.array_equal(other.q, usual.q)
 
 
 def test_a_preference_does_not_make_a_goal_unreachable():
     """The left arm that is to hang by far more than anything else counts does not keep the right one from its goal."""
-    for weight in (0.1, 6.0, 1e4):
+    for weight in (0.1, 1e4):
         measures = [wb.Effort(), wb.tasks.Rhythm(), wb.tasks.Hang(["left_upper_arm"], weight=weight)]
         assert wb.solve(behind_a_panel(measures)).status == "solved"
 

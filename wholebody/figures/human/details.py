@@ -100,9 +100,9 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     core = (1.0 - 0.4) * high
     yield _between(f"{name}:2", name, core, (front, inwards(out), -0.3 * thigh), (front, inwards(out), -0.42 * thigh))
     knee = person.size("knee")
-    # Where the knee is thicker than the thigh below its axis, it is that in front of the seat.
-    over = max(knee - person.size("seat"), 0.0)
-    yield _between(f"{name}:1", name, knee, (over, 0.0, -0.6 * thigh), (0.0, 0.0, -thigh))
+    # Before the seat's front edge the underside is level with the seat, and rises to that of the knee.
+    start = (knee - person.size("seat"), 0.0, -0.66 * thigh)
+    yield _between(f"{name}:1", name, knee, start, (0.0, 0.0, -thigh))
     calf, ankle = radius("calf"), radius("ankle")
     name, shin = f"{side}_shank", 0.95 * knee  # the shin is not before the knee
     upper, lower = (min(back * calf, shin - calf) for back in (-0.15, -0.25))

@@ -48,6 +48,9 @@ class _Colors(NamedTuple):
 
 COLORS = _Colors()
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
+CLOTH = 0.003
+"""Thickness of shirt and trousers, metres."""
+
 SIDES = (("left", 1.0), ("right", -1.0))
 HALVES = {"upper_arm": "clavicle", "forearm": "upper_arm", "hand": "forearm", "thigh": "pelvis", "shank": "thigh"}
 """Segments with a bone that turns half as much as they do against the segment named here: joints keep their volume."""
@@ -105,16 +108,14 @@ class PersonShape:
             return placed(limb(balls), self.bind[segment])
         child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
         end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
-        first, last = balls[0][1], balls[-1][1]
+        (_, first), (_, last) = balls[0], balls[-1]
         start, top = (0.95 * first, -0.015) if part == "thigh" else (first, 0.0)
-        if part == "upper_arm":
-            last = 0.5 * (last + caps(self.solids, f"{side}_forearm")[0][1])
-        elif part == "forearm":
-            start = 0.5 * (first + caps(self.solids, f"{side}_upper_arm")[-1][1])
-        elif part == "shank":
+        if part == "shank":
             start = caps(self.solids, f"{side}_thigh")[-1][1]
-        ends = (np.array([0.0, 0.0, top]), start), (end[:3], last)
-        return placed(limb([ends[0], *balls, ends[1]], 0.040), self.bind[segment])
+        # Around the elbow the joint is nearer to the skin than to the middle of the arm: the pieces end there.
+        before = [] if part == "forearm" else [(np.array([0.0, 0.0, top]), start)]
+        after = [] if part == "upper_arm" else [(end[:3], last)]
+        return placed(limb([*before, *balls, *after], 0.040), self.bind[segment])
 
     def _claims(self, segments: Sequence[str]) -> list[Claim]:
         """Claims of limbs by their fields, of the trunk's segments by their heights, of halves at the joints."""
@@ -135,7 +136,7 @@ class PersonShape:
             if part == "upper_arm":  # a raised arm pulls the flank along
                 found.append(Claim(f"{segment}/half", grown(self._armpit(side)[1], -0.006), 0.022))
             if part in HALVES:
-                radius = {"upper_arm": 0.050, "forearm": 0.040, "hand": 0.026, "thigh": 0.085, "shank": 0.055}[part]
+                radius = {"upper_arm": 0.050, "forearm": 0.020, "hand": 0.026, "thigh": 0.060, "shank": 0.030}[part]
                 reach = radius * self.size.stature / 1.75
                 found.append(Claim(f"{segment}/half", grown(ball(self.at(segment), reach), 0.006)))
         return found
@@ -149,7 +150,7 @@ class PersonShape:
         for side, sign in SIDES:
             solids += [
                 self._limbs[f"{side}_clavicle"],
-                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"]], 0.008),
+                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"]], 0.004),
                 self._trapezius(side),
                 *self._armpit(side),
             ]
@@ -160,7 +161,7 @@ class PersonShape:
                 solids.append(ellipsoid(middle, np.array([0.066, 0.062, 0.062]) * scale))
         collar = 1.04 * size.body.radius("neck") + 0.006
         solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
-        body = grown(union(solids, 0.035 * scale), 0.006)  # m of cloth
+        body = grown(union(solids, 0.035 * scale), CLOTH)
         hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
         opening = half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))
         cuts = [hem, opening]
@@ -199,9 +200,9 @@ class PersonShape:
         solids = [self._trunk]
         for side, sign in SIDES:
             legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
-            solids.append(union(legs, 0.03))
+            solids.append(union([union(legs[:2], 0.004), legs[2]], 0.03))
             solids.append(self._buttock(sign))
-        body = _tapered(grown(union(solids, 0.04 * scale), 0.003), self._belt() - 0.036 * scale)  # m of cloth
+        body = _tapered(grown(union(solids, 0.04 * scale), CLOTH), self._belt() - 0.036 * scale)
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
@@ -216,9 +217,9 @@ class PersonShape:
 
     def _buttock(self, sign: float) -> Field:
         scale, height = self._scale, float(self.bind["pelvis"][2, 3])
-        back = self._trunk_ends(height - 0.01 * scale)[0]
-        middle = (back + 0.075 * scale, sign * 0.072 * scale, height - 0.030 * scale)
-        return ellipsoid(middle, np.array([0.080, 0.078, 0.085]) * scale)
+        back, low = self._trunk_ends(height - 0.01 * scale)[0], height - self.person.size("seat")
+        middle = (back + 0.080 * scale, sign * 0.072 * scale, low + 0.090 * scale)
+        return ellipsoid(middle, np.array([0.080, 0.078, 0.078]) * scale)
 
     def _calf(self, side: str, sign: float) -> Field:
         length, radius = self.person.length("left_shank"), self.person.radius("calf")
