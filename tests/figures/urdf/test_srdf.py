@@ -55,6 +55,7 @@ def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
     )
     noted = wb.load(urdf, srdf=files(tmp_path, SRDF.replace("</robot>", more))[1]).notes
     assert "SRDF: passive_joint, virtual_joint is not kept" in noted
+    assert "SRDF: passive_joint is not kept" in wb.load(urdf, srdf=srdf, root="free").notes
 
 
 def test_no_state_of_an_srdf_is_lost(tmp_path: Path) -> None:

@@ -40,7 +40,8 @@ def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
     """Read the SRDF of a URDF that has a model and links."""
     robot = read_robot(path, "SRDF")
     reader = _Reader(path, robot, model, links)
-    unknown = sorted({str(part.tag) for part in robot if isinstance(part.tag, str)} - READ)
+    read = READ | {"virtual_joint"} if reader.free else READ
+    unknown = sorted({str(part.tag) for part in robot if isinstance(part.tag, str)} - read)
     if unknown:
         reader.notes.append(f"SRDF: {', '.join(unknown)} is not kept")
     groups = {name: reader.joints(group, (name,)) for name, group in reader.groups.items()}
@@ -54,8 +55,9 @@ class _Reader:
         self._path, self._robot, self._model, self._links = path, robot, model, links
         self.groups = {str(group.get("name")): group for group in robot.findall("group")}
         self._virtual = {str(joint.get("name")) for joint in robot.findall("virtual_joint")}
+        self.free = model.existJointName(ROOT_JOINT)
         # Pinocchio's name of a free root stands in files that have no virtual joint
-        self._roots = {ROOT_JOINT, *self._virtual} if model.existJointName(ROOT_JOINT) else set()
+        self._roots = {ROOT_JOINT, *self._virtual} if self.free else set()
         self.notes: list[str] = []
         self._movable = {
             name: index
