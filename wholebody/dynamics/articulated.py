@@ -273,10 +273,8 @@ class Articulated:
     def _bear(self, inertia: Array, points: Points, time: float) -> Array:
         """Keep points apart at the end of a step; the impulses (m, 3)."""
         room = points.gap - SKIN
-        # a step removes a fifth of an overlap; what comes near ends it before the engine would find an impact
-        target = np.where(
-            room >= 0.0, 2.0 * impulse_kernel.LIMITS.tolerance - room / time, np.minimum(-0.2 * room / time, FASTEST)
-        )
+        # a step removes a fifth of an overlap
+        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, FASTEST))
         speed = self._relative(points)
         if points.bodies and self._engine is not None:
             fall = [self._engine.response(name)[:, :3] @ self._engine.weight(name) for name in points.bodies]
@@ -287,19 +285,19 @@ class Articulated:
         """Impulses (m, 3) that bring the points to least normal velocities; those of a blow add no kinetic energy."""
         if not len(target):
             return np.zeros((0, 3))
-        jacobian, joints = np.hstack([points.figure, points.things]), points.figure.shape[1]
-        inverse = np.zeros((jacobian.shape[1], jacobian.shape[1]))
-        inverse[:joints, :joints] = np.linalg.inv(inertia)
-        for b, name in enumerate(points.bodies):
-            here = slice(joints + 6 * b, joints + 6 * b + 6)
-            inverse[here, here] = self._engine.response(name)  # type: ignore[union-attr]
-        impulse, change = impulse_kernel.impulses(jacobian, inverse, speed, points.friction, target)
+        answer = np.linalg.solve(inertia, points.figure.T)
+        mobility = points.figure @ answer
+        if points.bodies and self._engine is not None:
+            for b, name in enumerate(points.bodies):
+                part = points.things[:, 6 * b : 6 * b + 6]
+                mobility += part @ self._engine.response(name) @ part.T
+        after = speed.copy()
+        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 1000, 1e-7)
         flat = impulse.ravel()
-        gain = float(flat @ (2.0 * speed + jacobian @ change))  # twice the energy that the impulses bring
+        gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
-            share = max(0.0, 1.0 - gain / float(flat @ jacobian @ change))
-            impulse, change = share * impulse, share * change
-        self.velocity = self.velocity + change[:joints]
+            impulse = impulse * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+        self.velocity = self.velocity + answer @ impulse.ravel()
         for name, c, place, axes in points.pushes:
             push = impulse[c] @ axes
             if push.any():

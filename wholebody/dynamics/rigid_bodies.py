@@ -376,11 +376,9 @@ class RigidBodies:
         state = self.state
         before, position = self.energy(), state.bodies.position.copy()
         for _ in range(4):
-            program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, self._yielding)
-            way = program.separation(0.5 * SKIN)
-            if not way.any():
-                break
-            motion_kernel.displace(state.bodies, way)
+            still = np.zeros_like(self._yielding)
+            program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, still)
+            motion_kernel.displace(state.bodies, program.separation(0.5 * SKIN))
             least = self._find_near(STEP)
             if least >= LEAST_GAP:
                 break

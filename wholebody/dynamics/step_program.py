@@ -242,14 +242,10 @@ class StepProgram:
         return found
 
     def separation(self, gap: float) -> Array:
-        """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap.
-
-        What yields goes out of the way by itself: a thing between it and the floor could not be parted from both.
-        """
+        """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""
         points = self.points
-        target = np.where(self._yielding[points.bodies].any(axis=1), -np.inf, gap - points.gap)
         way, impulse = np.zeros_like(self.state.bodies.twist), np.zeros_like(self.impulse)
-        laws = Laws(np.zeros(len(points.gap)), target, -self.joints.gaps(self.state))
+        laws = Laws(np.zeros(len(points.gap)), gap - points.gap, -self.joints.gaps(self.state))
         solve_kernel.solve_islands(self._rows, laws, way, impulse, self._limits(0.01 * gap))
         return way
 
