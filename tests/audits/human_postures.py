@@ -75,10 +75,13 @@ def median_man() -> dict[str, Figure]:
 
 
 def summary(rows: Sequence[PostureRow]) -> str:
-    """How many angles of each half are within a standard deviation of people, and the mean distance."""
+    """How many angles of each half are within a standard deviation of people, and the mean distance.
+
+    An angle of a posture that is not solved is not within one.
+    """
     told = []
     for half in dict.fromkeys(row.half for row in rows):
-        off = np.array([row.off for row in rows if row.half == half])
+        off = np.array([row.off if row.status == "solved" else max(row.off, 1.0) for row in rows if row.half == half])
         told.append(f"{half} {int((off < 1.0).sum())} of {len(off)} angles within one, {off.mean():.2f} on average")
     return "; ".join(told)
 
