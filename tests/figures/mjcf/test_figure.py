@@ -156,6 +156,11 @@ def test_a_linear_equality_is_followed_and_others_are_told(tmp_path: Path) -> No
     figure = wb.load(written(tmp_path, ARM.replace("</mujoco>", linear)))
     values = figure.joint_values(figure.with_joints(figure.neutral, {"swing": 0.4}))
     assert values["swing"] == pytest.approx(0.1 + 0.5 * values["roll"])
+    keys = '<keyframe><key name="home" qpos="0.3 0.4 0"/><key name="other" qpos="0.35 0.4 0"/></keyframe></mujoco>'
+    told = wb.load(written(tmp_path, ARM.replace("</mujoco>", linear.replace("</mujoco>", keys))))
+    assert [note for note in told.notes if "keyframe" in note] == [
+        "keyframe 'other': the joint 'roll' is where its equality puts it"
+    ]
     square = linear.replace("0.5 0 0 0", "0.5 1 0 0")
     notes = wb.load(written(tmp_path, ARM.replace("</mujoco>", square))).notes
     assert "joint 'swing': its <equality> is not linear in another joint, so it moves by itself" in notes

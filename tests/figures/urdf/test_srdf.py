@@ -69,6 +69,10 @@ def test_no_state_of_an_srdf_is_lost(tmp_path: Path) -> None:
     assert figure.joint_values(figure.posture("arm/home"))["j1"] == pytest.approx(0.2)
     assert "posture 'neutral' of the file is called 'neutral of the file'" in figure.notes
     assert "SRDF: state 'arm/home' is there twice; the last one is kept" in figure.notes
+    twice = SRDF.replace("<group_state", '<group name="arm"><joint name="j1"/></group><group_state', 1)
+    figure = wb.load(urdf, srdf=files(tmp_path, twice)[1])
+    assert figure.groups["arm"] == ("j1",)
+    assert "SRDF: group 'arm' is there twice; the last one is kept" in figure.notes
 
 
 def test_a_state_is_within_limits_but_where_the_file_says_otherwise(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
+from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Color, Concavity, LinkShape, check_concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
@@ -22,6 +23,8 @@ from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 
 SHAPES = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
 """Kinds of geoms, as MuJoCo numbers them."""
+
+ROUNDED = 1e-3  # rad, m: files round the values of keyframes
 
 
 def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:
@@ -108,12 +111,12 @@ def mjcf_figure(
     geometry, piece_notes, numbers = geometry_of_links(
         robot.model, shapes.values(), check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
     )
-    kept = list(shapes)
+    kept, postures = list(shapes), _postures(compiled, robot, notes)
     found = Robot(
         compiled.name, robot.model, links, geometry, (*notes, *piece_notes),
         visual=_visual(compiled, robot),
         frames=robot.sites,
-        postures=_postures(compiled, robot),
+        postures=postures,
         cones=robot.cones,
         untested=_untested(compiled, [kept[number] for number in numbers]),
         place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
@@ -147,11 +150,17 @@ def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, Color]:
     return found
 
 
-def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
-    """The configuration that joints refer to, and the keyframes."""
+def _postures(compiled: Compiled, robot: RobotModel, notes: list[str]) -> dict[str, Array]:
+    """The configuration that joints refer to, and the keyframes; notes say where an equality moves a joint of one."""
+    followers = followers_of(robot.model)
+    followed = {at: name for at, index in robot.joints.items() if (name := robot.model.names[index]) in followers}
     found = {"reference": robot.posture(compiled, compiled.model.qpos0)}
     for key, name in enumerate(compiled.names["key"]):
-        found[name] = robot.posture(compiled, compiled.model.key_qpos[key])
+        qpos = compiled.model.key_qpos[key]
+        found[name] = q = robot.posture(compiled, qpos)
+        for at, joint in followed.items():
+            if not abs(qpos[compiled.model.jnt_qposadr[at]] - followers[joint].value(q)) <= ROUNDED:
+                notes.append(f"keyframe {shown(name)}: the joint {shown(joint)} is where its equality puts it")
     for name in [name for name, q in found.items() if not np.isfinite(q).all()]:
         raise FileFormatError(f"{compiled.path}: keyframe {shown(name)} has values that are not finite; correct it")
     return {name: pin.normalize(robot.model, q) for name, q in found.items()}

@@ -58,7 +58,9 @@ class _Reader:
         self.free = model.existJointName(ROOT_JOINT)
         # Pinocchio's name of a free root stands in files that have no virtual joint
         self._roots = {ROOT_JOINT, *self._virtual} if self.free else set()
-        self.notes: list[str] = []
+        names = [str(group.get("name")) for group in robot.findall("group")]
+        twice = [name for name in self.groups if names.count(name) > 1]
+        self.notes = [f"SRDF: group {shown(name)} is there twice; the last one is kept" for name in twice]
         self._movable = {
             name: index
             for index, name in enumerate(model.names)
