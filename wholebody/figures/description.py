@@ -16,6 +16,7 @@ from wholebody.figures.body_spec import Solid
 from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
+ROUNDED = 1e-3  # rad, m: files round the values of postures, such as 1.5707, and the limits that they are at
 ROOT_JOINT = "root_joint"
 """Name of a free root in the model; that of a joined figure follows the figure's name: "anna/root_joint"."""
 

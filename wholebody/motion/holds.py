@@ -197,11 +197,13 @@ class Holds:
 
     def let_go(self, q: Array) -> str:
         """Which parts were let go of, or are farther than `OUT_OF_REACH` from their things in q (n, nq); or nothing."""
-        reports, touched = [], self._touched
-        for contact in () if touched is None else touched.contacts:
+        reports, touched = list[str](), self._touched
+        if touched is None:
+            return ""
+        for contact in touched.contacts:
             key = contact.role, contact.share, contact.base
             for number, point in enumerate(self.points):
-                if touched is None or not point.thing or (point.role, point.share, point.base) != key:
+                if not point.thing or (point.role, point.share, point.base) != key:
                     continue
                 frames = range(contact.first, min(contact.end, len(q)))
                 gaps = np.array([touched.gap(contact, point, frame, q[frame]) for frame in frames])

@@ -52,13 +52,20 @@ def test_inertia_of_the_female_thigh_belongs_to_its_sources_segment():
     assert who.inertia("left_thigh")[0] == pytest.approx(moment, rel=1e-9)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_thighs_and_buttocks_are_level_on_a_seat(case):
+def seated(case):
+    """A person with right angles at hips and knees, and where frames and pieces are."""
     figure = person(case)
     data, geometry_data = figure.model.createData(), pin.GeometryData(figure.geometry)
     names = ("left_hip_flexion", "right_hip_flexion", "left_knee_flexion", "right_knee_flexion")
     q = figure.with_joints(pin.neutral(figure.model), dict.fromkeys(names, math.pi / 2))
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
+    pin.framesForwardKinematics(figure.model, data, q)
+    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data)
+    return figure, data, geometry_data
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_thighs_and_buttocks_are_level_on_a_seat(case):
+    figure, _, geometry_data = seated(case)
     lowest = {}
     for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True):
         if piece.name in ("pelvis", "left_thigh:0", "right_thigh:0"):
@@ -70,12 +77,7 @@ def test_thighs_and_buttocks_are_level_on_a_seat(case):
 @pytest.mark.parametrize("case", CASES)
 def test_the_thigh_lies_on_the_seat_up_to_its_front_edge(case):
     """Popliteal height is that of the thigh's underside at the knee: a seat that is higher presses there."""
-    figure = person(case)
-    data, geometry_data = figure.model.createData(), pin.GeometryData(figure.geometry)
-    names = ("left_hip_flexion", "right_hip_flexion", "left_knee_flexion", "right_knee_flexion")
-    q = figure.with_joints(pin.neutral(figure.model), dict.fromkeys(names, math.pi / 2))
-    pin.framesForwardKinematics(figure.model, data, q)
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data)
+    figure, data, geometry_data = seated(case)
     sole, knee = (data.oMf[figure.frame_id(f"left_{name}")].translation for name in ("sole", "knee"))
     gap = math.inf
     for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True):

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.description import followers_of
+from wholebody.figures.description import ROUNDED, followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Color, Concavity, LinkShape, check_concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
@@ -23,8 +23,6 @@ from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 
 SHAPES = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
 """Kinds of geoms, as MuJoCo numbers them."""
-
-ROUNDED = 1e-3  # rad, m: files round the values of keyframes
 
 
 def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.description import ROOT_JOINT, zero_within_limits
+from wholebody.figures.description import ROOT_JOINT, ROUNDED, zero_within_limits
 from wholebody.figures.urdf.xml_reading import bounded, numbers, read_robot
 from wholebody.geometry.placement import FARTHEST
 
@@ -22,8 +22,6 @@ READ = {
     "end_effector",  # a name for a group
 }
 """Elements that are read."""
-
-ROUNDED = 1e-3  # rad, m: files round the values of states, such as 1.5707, and the limits that they are at
 
 
 class Srdf(NamedTuple):
