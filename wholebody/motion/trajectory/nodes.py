@@ -19,6 +19,8 @@ from wholebody.motion.trajectory.loads import WindowLoads
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint, Goal
 
+ALLOWED = 6e-5  # m: an overlap between frames that is no dip, and is met by as much as a frame is; see `faults.DIP`
+ROOM = 1e-4 + ALLOWED
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
 Terms = Sequence[Constraint | Goal]
@@ -44,8 +46,8 @@ class Node(NamedTuple):
 
     @property
     def room(self) -> float:
-        """Metres that programs ask of its rows beyond what must be met: what is beside a place dips by less."""
-        return 1e-4 if self.share else 0.0
+        """Metres that programs ask of missed rows beyond what must be met: what is beside a place dips by less."""
+        return ROOM if self.share else 0.0
 
 
 class Rows(NamedTuple):
@@ -58,6 +60,16 @@ class Rows(NamedTuple):
     group: Indices  # (r,) rows of one contact share a number; the worst of them counts
     equal: Array  # (e,) values of the equalities; to be zero
     equal_rows: Array  # (e, nv) their derivatives
+
+    @property
+    def asked(self) -> Array:
+        """(r,) what programs ask of each row: room of a missed one, of another no less of it than it has.
+
+        Soles that rest sink a little between frames. Room of them too would bend the whole body at every frame.
+        """
+        room = self.node.room
+        asked: Array = np.where(self.gap < 0.0, room, np.minimum(self.gap, room))
+        return asked
 
     @property
     def shortfalls(self) -> Array:
@@ -121,6 +133,7 @@ class NodeEvaluator:
         chart, now, then = self.chart, node.frame, node.frame + 1
         q, first, second = chart.between(chart.posture(now, x[now]), chart.posture(then, x[then]), node.share)
         gap, rows, group = self._contacts(q, within)
+        gap = gap + ALLOWED
         before, after = chart.carried(now, x[now], rows @ first), chart.carried(then, x[then], rows @ second)
         return Rows(node, gap, (before, after), group, np.zeros(0), np.zeros((0, rows.shape[1])))
 

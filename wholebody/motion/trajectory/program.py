@@ -163,7 +163,7 @@ def predicted(one: Rows, step: Array) -> Array:
 
 def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
     """For each node which rows are tight or missed after a step (n, nv), to a micrometre."""
-    return [predicted(one, step) <= one.node.room + 1e-6 for one in rows]
+    return [predicted(one, step) <= one.asked + 1e-6 for one in rows]
 
 
 def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:
@@ -224,7 +224,7 @@ def _contact_part(step: Step, columns: Sequence[Indices], place: Indices, size: 
     for one, keep, slack in zip(step.rows, step.kept, columns, strict=True):
         frame, many = one.node.frame, len(slack)
         index = np.arange(number, number + many)
-        bound = np.minimum(one.node.room - one.gap[keep], ONE_STEP)
+        bound = np.minimum((one.asked - one.gap)[keep], ONE_STEP)
         for offset, part in enumerate(one.parts):
             own = part[np.ix_(keep, dofs)]
             values.append(own.ravel())

@@ -206,7 +206,7 @@ class WindowProgram:
             x, solved = layout.deviations(minimise(layout.program).z, here.x), solved + 1
             left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]
             missed = [
-                mask & (predicted(one, x - here.x) < one.node.room - MET) if mask.any() else mask
+                mask & (predicted(one, x - here.x) < one.asked - MET) if mask.any() else mask
                 for one, mask in zip(here.rows, left, strict=True)
             ]
             if not any(mask.any() for mask in missed):
