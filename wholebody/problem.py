@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array
 from wholebody.base.charts import listing
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
@@ -29,6 +29,7 @@ from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
+_Term = TypeVar("_Term", Constraint, Measure)
 _TermError = TypeVar("_TermError", bound=TermError)
 _Planned = tuple[tuple[Constraint, ...], tuple[Bound, ...], tuple[Measure, ...]]
 
@@ -143,16 +144,16 @@ class Problem(checks.FixedAttributes):
             goals=tuple([goal.resolve(scene, q) for goal in listed]),
             bounds=tuple([term.resolve(scene, q) for term in given if isinstance(term, Bound)]),
             touching=tuple([owner_pair(scene, pair) for pair in pairs]),
-            measures=tuple([m.resolve(scene, q) for m in measured or ()]),
             defaults=(),
             _usual=None if measured is not None else (),
             _places=tuple([place for place, term in enumerate(given) if isinstance(term, Constraint)]),
             _plan=None,
         )
         own = self._resolved([given[place] for place in self._places])
-        vars(self).update(constraints=own, _joined=own)
+        costs = self._resolved(measured or ())
+        vars(self).update(constraints=own, _joined=own, measures=costs)
         vars(self).update(self._by_default(self.goals))
-        if self.bounds or any(map(is_own, (*self.goals, *self.stated, *(() if measured is None else self.measures)))):
+        if self.bounds or any(map(is_own, (*self.goals, *own, *costs))):
             check_frozen(self.bounds, scene, state := scene.state(q))
             check_own(state, goals=self.goals, constraints=self.constraints, measures=self.measures)
         vars(self).update(clearances=self._clearances(self.goals))
@@ -190,8 +191,8 @@ class Problem(checks.FixedAttributes):
             return measures, ((), "")
         return measures, usual_constraints(scene, at, stated, stands, ranges=ranges, balance=balance)
 
-    def _resolved(self, terms: Sequence[Constraint]) -> tuple[Constraint, ...]:
-        """Constraints that were stated, resolved; the same ones in the same scene at the same start are known."""
+    def _resolved(self, terms: Sequence[_Term]) -> tuple[_Term, ...]:
+        """Terms that were stated, resolved; the same ones in the same scene at the same start are known."""
         if not terms:
             return ()
         found = (term.resolve(self.scene, self.start) for term in terms)
@@ -379,19 +380,20 @@ class Problem(checks.FixedAttributes):
         built = self.scene.built
         if self.clearance == 0.0:  # which no pair has less than
             return np.zeros(len(built.table.pairs))
-        asked = np.empty(len(built.table.pairs))
-        asked.fill(self.clearance)
         brought = [pair for term in (*goals, *self.constraints, *self.measures) for pair in term.touching]
         allowed = frozenset((*self.touching, *brought))
+        key = "clearances", self.clearance, allowed, built.moves, self._rest.tobytes()
+        return np.array(built.known(key, partial(self._asked, allowed)))
+
+    def _asked(self, allowed: frozenset[tuple[str, str]]) -> Array:
+        """(pairs,) the clearance of each: none of those that may touch, the distance at the start of those at rest."""
+        built = self.scene.built
+        asked = np.full(len(built.table.pairs), self.clearance)
         if allowed:
             asked[built.known(("touching", allowed), partial(built.between, allowed))] = 0.0
-        number, kept = built.known(("resting", self.clearance, built.moves, self._rest.tobytes()), self._resting)
-        asked[number] = np.minimum(asked[number], kept)
-        return asked
-
-    def _resting(self) -> tuple[Indices, Array]:
-        """Pairs (k,) nearer than the clearance at the start that do not penetrate, and their distances (k,)."""
-        with borrowed(self.scene.built) as workspace, self.scene.figure.posed(self._rest) as state:
+        with borrowed(built) as workspace, self.scene.figure.posed(self._rest) as state:
             near = workspace.proximity.query_views(state.data, self.clearance + 1e-9)
-            resting = near.distance >= -1e-6
-            return near.number[resting], np.maximum(near.distance[resting], 0.0)
+            resting = near.distance >= -1e-6  # the others penetrate
+            number = near.number[resting]
+            asked[number] = np.minimum(asked[number], np.maximum(near.distance[resting], 0.0))
+        return asked

@@ -13,10 +13,12 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.audits.plan_scenes import hand_into_box
 from wholebody.base import compiled
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan, planner
+from wholebody.planning.local_planner import TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, shortcut
@@ -237,6 +239,22 @@ def test_steps_along_a_wall_from_the_end_find_the_way_that_steps_from_the_start_
     assert found.message != "the straight motion"
     assert least_along(scene, found.clip.q, least_distance) >= -1e-6
     assert not wb.plan(scene, end, start, time_limit=0.5).solved
+
+
+def test_a_hand_that_is_pulled_out_of_a_box_gives_way_to_its_edges(least_distance: Distance) -> None:
+    scene, start, inside, _ = hand_into_box(0)
+    problem, out = wb.Problem(scene, start), inside - 0.35 * np.eye(len(inside))[0]
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        steps.admit(inside)
+        _, met = steps.towards(inside, out)  # keeps its grip, which is larger than the hole
+        pulled = steps.pulled(inside, out)
+        _, opened = steps.towards(pulled[-1], np.hstack((pulled[-1][:7], start[7:])))  # by joints again
+    assert opened
+    assert not met
+    assert np.linalg.norm(pulled[-1][:3] - out[:3]) < 0.02
+    assert np.linalg.norm(pulled[-1][7:] - inside[7:]) > 0.1
+    assert least_along(scene, np.array([inside, *pulled]), least_distance) > 0.0
 
 
 def test_a_free_root_keeps_to_the_usual_speed(free_bodies: Callable[..., wb.Figure]) -> None:

@@ -41,22 +41,18 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
             _check_values(values, what)
         return pin.SE3(_UPRIGHT, values)
     if values.shape == (7,):
-        turn = values[3:]
-        norm = math.sqrt(turn.dot(turn))
+        a, b, c, x, y, z, w = values.tolist()
+        norm = math.sqrt(x * x + y * y + z * z + w * w)
         if math.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
             raise InputError(f"{what}: the quaternion has length {norm:.6g}, not 1; give qx, qy, qz, qw of a rotation")
-        if values[3] == 1.0:
+        if not a * a + b * b + c * c + norm <= FARTHEST**2:  # NaN is not
+            _check_values(values, what)
+        if x == 1.0:
             meaning = "is half a turn about x; quaternions are x, y, z, w, and (0, 0, 0, 1) is no turn"
             warnings.warn(f"{what}: the quaternion (1, 0, 0, 0) {meaning}", stacklevel=3)
-        x, y, z, w = (turn / norm if math.isfinite(norm) else turn).tolist()
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        return _rigid(rotation, values[:3], what)
+        if norm != 1.0:
+            values = np.hstack((values[:3], values[3:] / norm))
+        return pin.XYZQUATToSE3(values)
     if values.shape == (4, 4):
         if np.isfinite(values).all() and np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROUNDING:
             raise InputError(f"{what}: the last row of the 4x4 matrix is {values[3].tolist()}, not [0, 0, 0, 1]")

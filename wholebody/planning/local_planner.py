@@ -35,6 +35,9 @@ REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by st
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
 LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
+LOOSE = (
+    0.1  # of the weight of anything but the place of a root that is pulled; larger = gets stuck, smaller = ends far off
+)
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
@@ -203,6 +206,11 @@ class TrackedMotions:
         self._held = holds(problem)
         self.shares = np.ones(self._model.nv) if self._held else self.geodesics.shares
         self._attraction = Attraction(problem.start, self.shares**2)
+        self._factors = np.ones(self._model.nv)  # on the shares by which a target counts
+        self._loose = np.full(self._model.nv, LOOSE)
+        for root in problem.scene.figure.roots.values():
+            place = self._model.joints[root].idx_v
+            self._loose[place : place + 3] = 1.0
         self.partial = not self._held  # what is held takes all joints along
         self._problem.goals = (self._goal,) if self._held else ()
         self._problem.measures = () if self._held else (self._attraction,)
@@ -245,6 +253,18 @@ class TrackedMotions:
             way.append(q)
         return way, True
 
+    def pulled(self, q: Array, target: Array) -> list[Array]:
+        """Postures (nq,) of a motion from q that pulls free roots to their places in a target (nq,), without q.
+
+        All else gives way to what is around it, as a hand that is drawn out of a box does.
+        """
+        usual, self._factors = self._factors, self._loose
+        self._attraction.weigh(self._loose**2)
+        way, _ = self.towards(q, target)
+        self._factors = usual
+        self._attraction.weigh(usual**2)
+        return way
+
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `Geodesics`."""
         found, late = path.copy(), np.zeros(len(path), dtype=bool)
@@ -262,7 +282,7 @@ class TrackedMotions:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))
 
     def _rest(self, q: Array, target: Array) -> float:
-        return float(np.linalg.norm(self.shares * pin.difference(self._model, q, target)))
+        return float(np.linalg.norm(self._factors * self.shares * pin.difference(self._model, q, target)))
 
 
 LocalPlanner: TypeAlias = Geodesics | TrackedMotions

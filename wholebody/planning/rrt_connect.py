@@ -51,7 +51,8 @@ class Tree:
 class RRTConnect:
     """A tree from the start and one from the ends, which `local` lets grow, and `slides` where that is blocked at once.
 
-    So branches towards samples go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008).
+    So branches towards samples go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008):
+    a root is pulled to its place in a sample, and all else gives way, which leads out of narrow places.
 
     Attributes:
         samples: how many they were extended towards.
@@ -95,8 +96,7 @@ class RRTConnect:
         number = tree.nearest(target)
         way, met = self._local.towards(tree.postures[number], target)
         if not (way or met) and slides is not None:
-            # rad, m: length of a branch along things; longer ones take 2 ms a step
-            way, met = slides.towards(tree.postures[number], target, 2.0)
+            way = slides.pulled(tree.postures[number], target)
         for q in way:
             number = tree.add(q, number)
         return (number if way or met else None), met

@@ -10,13 +10,13 @@ chapter 25). Its derivative along the error is 1 at every angle, so no angle is 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
-from math import atan2, hypot, pi, sin
+from math import atan2, hypot, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, cross
+from wholebody.base.arrays import Array
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import called
@@ -137,8 +137,10 @@ def equidistant_jacobian(x: float, y: float, along: float) -> Array:
 
 def across(axis: Array) -> Array:
     """(3, 3) rows: two directions perpendicular to a unit vector, and the vector itself."""
-    helper = np.zeros(3)
-    helper[int(np.argmin(np.abs(axis)))] = 1.0
-    first = cross(axis, helper)
-    first /= np.linalg.norm(first)
-    return np.array([first, cross(axis, first), axis])
+    x, y, z = axis.tolist()
+    sizes = abs(x), abs(y), abs(z)
+    # the axis times the coordinate axis that is farthest from it
+    a, b, c = ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))[sizes.index(min(sizes))]
+    length = sqrt(a * a + b * b + c * c)
+    a, b, c = a / length, b / length, c / length
+    return np.array(((a, b, c), (y * c - z * b, z * a - x * c, x * b - y * a), (x, y, z)))
