@@ -46,8 +46,7 @@ class Multistart:
         self._start = problem.scene.figure.clamp(problem.start)
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._least = 0.0  # lower bound of the goals' residual, metres
-        # where relaxed probes ended after the true clearances were required, and where the others ended
-        self._minima, self._relaxed_minima = Minima(), Minima()
+        self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
@@ -113,7 +112,7 @@ class Multistart:
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt]:
         """Those in which measures do not count."""
-        start, state, least = self._start, self.lineariser.state, self._least
+        start, state, least, tried = self._start, self.lineariser.state, self._least, self.tried
         self._first = len(self.trace)
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
@@ -126,7 +125,8 @@ class Multistart:
             apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
             starts = self.lineariser.defined([] if apart is None else [apart])
             yield Attempt(starts, lambda q: self._probe(q, 0.0), "from where contacts that cancel are left")
-        if self.problem.measures:  # they lay limbs beside each other; at random two hands at the face cross, and jam
+        # Measures lay limbs beside each other, also before contact; random hands at the face cross, and jam.
+        if self.problem.measures and self.tried <= tried + 1:
             relaxed = with_values(self._shared, lineariser=self.lineariser.relaxed(SEARCH.rest_depth))
             rest = SQP(relaxed, self.settings.tolerance, self._at_most(SEARCH.rest_programs), "through things")
             if (local := self._ran(rest, start)).violation.worst <= SEARCH.reached * self.settings.tolerance:
