@@ -39,6 +39,16 @@ def test_what_fits_is_kept_where_measures_lead_away(honest):
     assert honest(problem, wb.methods.QP(budget=0, restarts=0).solve(problem)).status == "solved"
 
 
+def test_two_hands_come_to_the_face_from_one_start(honest, human):
+    """Only hands held upright side by side fit there; hands that cross rest against each other 0.5 to 25 mm short."""
+    from tests.audits.human_postures import face
+
+    problem = face(human)
+    assert honest(problem, wb.methods.QP(restarts=0).solve(problem)).status == "solved"
+    palms = [human.placement(problem.start, f"{side}_palm").translation for side in ("left", "right")]
+    assert np.linalg.norm(palms[0] - palms[1]) > 0.3  # they come from the sides
+
+
 def test_whole_steps_stay_in_their_box(planar_arm):
     from wholebody.methods.control import Control
     from wholebody.methods.qp.feasibility import Feasibility

@@ -46,8 +46,7 @@ class Multistart:
         self._start = problem.scene.figure.clamp(problem.start)
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._least = 0.0  # lower bound of the goals' residual, metres
-        self._minima = Minima()  # where relaxed probes ended after the true clearances were required
-        self._relaxed_minima = Minima()  # where the others ended
+        self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
@@ -113,7 +112,7 @@ class Multistart:
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt]:
         """Those in which measures do not count."""
-        start, state, least = self._start, self.lineariser.state, self._least
+        start, state, least, tried = self._start, self.lineariser.state, self._least, self.tried
         self._first = len(self.trace)
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
@@ -126,6 +125,12 @@ class Multistart:
             apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
             starts = self.lineariser.defined([] if apart is None else [apart])
             yield Attempt(starts, lambda q: self._probe(q, 0.0), "from where contacts that cancel are left")
+        # Measures lay limbs beside each other, also before contact; random hands at the face cross, and jam.
+        if self.problem.measures and self.tried <= tried + 1:
+            relaxed = with_values(self._shared, lineariser=self.lineariser.relaxed(SEARCH.rest_depth))
+            rest = SQP(relaxed, self.settings.tolerance, self._at_most(SEARCH.rest_programs), "through things")
+            if (local := self._ran(rest, start)).violation.worst <= SEARCH.reached * self.settings.tolerance:
+                yield Attempt([local.q], self._free, "from a rest through things")
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
         if few := moving(self._shared, self.best.q) < SEARCH.few:
@@ -363,16 +368,12 @@ class Multistart:
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
-        nearest = self._goal_errors(local.q)
+        nearest = self.lineariser.at(local.q, 0.0).goal_error
         most = self._at_most(SEARCH.staying) if held(local, self.settings.tolerance) else self.settings.iterations
         stayed = self._ran(self._descent(most, nearest, "nearest"), local.q)
-        left = float(np.linalg.norm(self._goal_errors(stayed.q)))
+        left = float(np.linalg.norm(self.lineariser.at(stayed.q, 0.0).goal_error))
         violation = with_values(stayed.violation, goal=left, left=left)
         return with_values(stayed, violation=violation, converged=local.converged)
-
-    def _goal_errors(self, q: Array) -> Array:
-        state = self.lineariser.state.update(q)
-        return np.hstack([np.zeros(0), *(goal.error(state) for goal in self.problem.goals)])
 
     def _descend(
         self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False

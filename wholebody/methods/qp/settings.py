@@ -145,6 +145,10 @@ class SearchNumbers(NamedTuple):
     # 18 with 0.07, 9 with 0.15) and from others. More: limbs change sides more easily, and are harder to separate.
     start_depth: float = 0.07
     relaxation_depth: float = 0.15
+    # m: the same of a descent with measures. Of 19 reaches of both hands to the body 0.05 leads to 12, 0.03 to 4, and
+    # 0.07 to 10.
+    rest_depth: float = 0.05
+    rest_programs: int = 60  # most of it. Fewer: ends before it; more: goals that none reaches take longer.
     beside: int = 40  # probes from beside goals. More: goals behind things are found, what none reaches takes longer.
     displaced: float = 0.5  # m, rad: of goals along each axis, the standard deviation. Less: the same side of things.
     reached: float = 10.0  # tolerances that a relaxed probe must come within for a second one. More: more in vain.
