@@ -245,11 +245,7 @@ class Multistart:
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
             local = self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start)
-            alike = local.violation.worst <= tolerance and local.measure <= 1.005 * self.best.measure
-            if alike and assess(problem, local.q).optimality < judged.optimality:
-                self._best = local  # what it costs more was bought with the tolerance
-            else:
-                self._accept(local, self.how)
+            self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _starts_for_measure(self, count: int) -> Iterable[Array]:
@@ -301,8 +297,6 @@ class Multistart:
             return
         if self.out_of_reach:
             local = self._ran(self._closest(), self.best.q)
-            if not held(local, tolerance) and local.violation.total < self.best.violation.total:
-                local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
             self._accept(local, self.how)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
