@@ -48,7 +48,6 @@ class Multistart:
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
-        self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self.out_of_reach = False  # as it seems
@@ -130,9 +129,9 @@ class Multistart:
         if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
-        starts = self.lineariser.defined(chain(self._through, others))
+        starts = self.lineariser.defined(others)
         beside = self._beside(0 if few or least or not self.problem.goals else min(count, SEARCH.beside))
-        for _ in range(count + len(self._through)):  # in turn: one from beside takes the programs of two others
+        for _ in range(count):  # in turn: one from beside takes the programs of two others
             yield Attempt(islice(beside, 1), self._free, "from beside the goals")
             yield Attempt(islice(starts, 2), self._relaxed, "from another start")
 
@@ -321,14 +320,14 @@ class Multistart:
             return False
         given = self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed)
         agreeing = SEARCH.agreeing_few if (few := moving(self._shared, self.best.q) < SEARCH.few) else SEARCH.agreeing
-        starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
-        starts = chain([q], self.lineariser.defined(starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)))
+        starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else restarts(*given, SEARCH.reach_trials - 1)
+        starts = chain([q], self.lineariser.defined(starts))
         enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
         found = reach_trials(reach, starts, self._near, agreeing, self.settings.tolerance)
         self.spent += found.spent
-        self._through, self._near = ([] if found.reached is None else [found.reached]), found.nearest
+        self._near = found.nearest
         return found.out_of_reach
 
     def _closest_from_best(self) -> None:
