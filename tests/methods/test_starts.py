@@ -85,6 +85,6 @@ def test_each_part_of_a_joints_range_is_seen_once(problem: wb.Problem) -> None:
 
 def test_a_joint_without_limits_starts_anywhere(problem: wb.Problem) -> None:
     with problem.borrow() as workspace:
-        found = angles(problem, restarts(problem, workspace.state, problem.start, np.random.default_rng(0), 40, [1.0]))
+        found = angles(problem, restarts(problem, workspace.state, problem.start, np.random.default_rng(0), 120))
     assert found[:, 1].min() < -2.5
     assert found[:, 1].max() > 2.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
@@ -31,15 +31,12 @@ def off_limits(problem: Problem, state: State, start: Array) -> Array | None:
     return None if np.array_equal(moved, start) else moved
 
 
-def restarts(
-    problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int,
-    spreads: Sequence[float] = SPREADS,
-) -> Iterator[Array]:  # fmt: skip
-    """Random postures (nq,) within limits and bounds, as far as `spreads`, shares of the ranges, say in turn."""
+def restarts(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
+    """Random postures (nq,) within limits and bounds, as far as `SPREADS`, shares of the ranges, say in turn."""
     lower, upper = _ranges(problem, start)
     span = upper - lower
     for number in range(count):
-        spread = spreads[number % len(spreads)]
+        spread = SPREADS[number % len(SPREADS)]
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 

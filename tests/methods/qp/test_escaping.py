@@ -50,10 +50,3 @@ def test_it_finds_the_far_side_where_the_near_one_is_barred() -> None:
 def test_there_is_none_where_bounds_end_inside(most: float) -> None:
     begun = np.array([0.05, 0.01])
     assert free_end(point(), begun, 1e-6, around(begun, np.array([most, most]))) is None
-
-
-def test_a_joint_without_limits_is_no_free_root() -> None:
-    model = pin.Model()
-    model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "turn")  # two coordinates, one degree of freedom
-    inside = ProjectionRows(0.1, np.zeros((0, 1)), np.zeros(0), np.array([[-0.1], [0.1]]))
-    assert free_end(model, np.array([1.0, 0.0]), 1e-6, lambda _: inside) is None

@@ -149,7 +149,6 @@ class Descents:
                 branches = self._branches()
                 others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
-            met = self._along(met)
             if met is None and finite:
                 return self._nearest() if self._is_out_of_reach() else None
             if (met is not None and met.blocked is None) or finite or self.control.over:
@@ -167,7 +166,7 @@ class Descents:
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if first is None:
-                met = self._along(self._ended(seeds, enough))
+                met = self._ended(seeds, enough)
             else:
                 (ends, found), first = first, None
                 met = self._chosen(ends, found)
@@ -265,19 +264,6 @@ class Descents:
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
-
-    def _along(self, met: Met | None) -> Met | None:
-        """An end near singular postures, which programs lead to no least effort from, led there along its branch."""
-        if met is None or met.stationary or not ((self.rule.held or self.rule.finite) and self.measured):
-            return met
-        at = self.chain.angles(met.q)
-        goals, _, nearest, _ = self.asked
-        values = None if self.rule.finite else self.chain.along(goals, nearest, at)
-        ended = None if values is None else self._ended(values[None], 1)
-        if ended is not None and self._effort(ended.q) <= self._effort(met.q):
-            met = with_values(met, q=ended.q)
-        # Where not even this is stationary, branches cross; a descent finds hardly less in a hundred times the time.
-        return with_values(met, trace=tuple(self.trace), stationary=True)
 
     def _to_the_edge(self, values: Array) -> Met:
         """From a free sample (n,) along its branch to the least effort, as far as clearances are kept, by bisection."""

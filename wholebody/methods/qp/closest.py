@@ -135,7 +135,6 @@ class ReachTrials(NamedTuple):
     """What descents through everything tell of how near goals can come."""
 
     out_of_reach: bool  # whether enough of them rest at the same distance
-    reached: Array | None  # (nq,) where one from another start than the first reaches them
     nearest: LocalSolution | None  # of all ends that count and what was known the nearest; None without any
     spent: int  # programs
 
@@ -149,20 +148,19 @@ def reach_trials(
     minima differ.
     """
     ends, spent = list[LocalSolution](), 0
-    for number, begin in enumerate(starts):
+    for begin in starts:
         local = reach.run(begin)
         spent += local.iterations
-        met = local.violation.worst <= reach.tolerance
-        if met or reach.shared.control.over:
-            return ReachTrials(False, local.q if met and number else None, near, spent)
+        if local.violation.worst <= reach.tolerance or reach.shared.control.over:
+            return ReachTrials(False, near, spent)
         if local.violation.hold > SEARCH.held * local.violation.left:
             continue  # from there the constraints alone are too far
         ends.append(local)
         near = local if near is None or local.violation.total < near.violation.total else near
         most = SEARCH.agree * near.violation.total + tolerance
         if sum(end.violation.total <= most for end in ends) == agreeing:
-            return ReachTrials(True, None, near, spent)
-    return ReachTrials(False, None, near, spent)
+            return ReachTrials(True, near, spent)
+    return ReachTrials(False, near, spent)
 
 
 def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:

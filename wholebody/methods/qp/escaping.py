@@ -1,8 +1,8 @@
 """A free posture for the end of a frame in which a thing came faster than the figure can move.
 
-Postures within what bounds allow are sought with the thing where it ends: from the posture before, from where its root
-may go, and from random ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937). A program
-would leave all of them violated where not all can be parted to first order.
+Postures within what bounds allow are sought with the thing where it ends: from the posture before and from random
+ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937). A program would leave all of them
+violated where not all can be parted to first order.
 """
 
 from __future__ import annotations
@@ -15,13 +15,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import with_loops
-from wholebody.figures.state import free_roots, root_freedoms
+from wholebody.figures.state import root_freedoms
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.settings import ESCAPE
-
-DIRECTIONS = (
-    (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0),
-)  # fmt: skip
 
 
 class ProjectionRows(NamedTuple):
@@ -57,14 +53,6 @@ def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], 
 def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
     """Displacements (nv,) to begin at, all within a box (2, nv)."""
     yield np.zeros(model.nv)
-    for joint in free_roots(model):
-        first = int(model.joints[joint].idx_v)
-        place = slice(first, first + 3)
-        if np.isfinite(box[:, place]).all() and box[:, place].any():
-            for way in DIRECTIONS:
-                begun = np.zeros(model.nv)
-                begun[place] = [0.0 if sign == 0 else box[max(sign, 0), first + axis] for axis, sign in enumerate(way)]
-                yield begun
     low, high = np.clip(box, -ESCAPE.farthest, ESCAPE.farthest)
     rng, joints = np.random.default_rng(0), ~root_freedoms(model)
     for _ in range(ESCAPE.random):

@@ -47,7 +47,6 @@ class Multistart:
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
-        self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self.out_of_reach = False  # as it seems
@@ -77,7 +76,6 @@ class Multistart:
         if other is not None:
             self._accept(self.directly(other), "directly")
         self._find_closest()
-        self._go_on()
         self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
@@ -136,9 +134,9 @@ class Multistart:
         if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         others = (throughout if few else restarts)(self.problem, state, start, rng, count)
-        starts = self.lineariser.defined(chain(self._through, others))
+        starts = self.lineariser.defined(others)
         beside = self._beside(0 if few or least or not self.problem.goals else min(count, SEARCH.beside))
-        for _ in range(count + len(self._through)):  # in turn: one from beside takes the programs of two others
+        for _ in range(count):  # in turn: one from beside takes the programs of two others
             yield Attempt(islice(beside, 1), self._free, "from beside the goals")
             yield Attempt(islice(starts, 2), self._relaxed, "from another start")
 
@@ -235,13 +233,6 @@ class Multistart:
             self._accept(self._descend(local.q), self.how)
         return self.best.measure < SEARCH.moved * before
 
-    def _go_on(self) -> None:
-        """Descend on where a descent had spent its programs while the measures still decreased."""
-        gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
-        while gains and not self.best.converged and self._left > 0 and not self.control.over:
-            before = self.best.measure
-            gains = self._accept(self._descend(self.best.q), self.how) and self.best.measure < SEARCH.moved * before
-
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
         # At a kink two points touch at once; the point that counts as the contact should leave.
@@ -258,11 +249,7 @@ class Multistart:
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
             local = self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start)
-            alike = local.violation.worst <= tolerance and local.measure <= 1.005 * self.best.measure
-            if alike and assess(problem, local.q).optimality < judged.optimality:
-                self._best = local  # what it costs more was bought with the tolerance
-            else:
-                self._accept(local, self.how)
+            self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _starts_for_measure(self, count: int) -> Iterable[Array]:
@@ -314,8 +301,6 @@ class Multistart:
             return
         if self.out_of_reach:
             local = self._ran(self._closest(), self.best.q)
-            if not held(local, tolerance) and local.violation.total < self.best.violation.total:
-                local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
             self._accept(local, self.how)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
@@ -340,14 +325,14 @@ class Multistart:
             return False
         given = self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed)
         agreeing = SEARCH.agreeing_few if (few := moving(self._shared, self.best.q) < SEARCH.few) else SEARCH.agreeing
-        starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else None
-        starts = chain([q], self.lineariser.defined(starts or restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)))
+        starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else restarts(*given, SEARCH.reach_trials - 1)
+        starts = chain([q], self.lineariser.defined(starts))
         enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
         found = reach_trials(reach, starts, self._near, agreeing, self.settings.tolerance)
         self.spent += found.spent
-        self._through, self._near = ([] if found.reached is None else [found.reached]), found.nearest
+        self._near = found.nearest
         return found.out_of_reach
 
     def _closest_from_best(self) -> None:

@@ -154,8 +154,6 @@ class SearchNumbers(NamedTuple):
     reached: float = 10.0  # tolerances that a relaxed probe must come within for a second one. More: more in vain.
     reach_trials: int = 10  # most descents without contacts that tell whether goals are out of reach
     reach_trial_programs: int = 60  # most programs of each
-    # shares of the joints' ranges that their starts may be away by. Smaller: local minima count as the edge of reach.
-    far: tuple[float, float] = (1.0, 0.6)
     # share of the goals' residual by which constraints may be missed where one ends that counts. Less: ends far from
     # the goals do not count, and probes go on in vain.
     held: float = 1e-2

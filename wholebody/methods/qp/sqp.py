@@ -108,7 +108,6 @@ class SQP(Stage):
             return
         worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
         clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
-        self._width = min(self._width, DESCENT.width)  # that of a far start lets steps along contacts swing
         self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
             self._kept = here
