@@ -144,6 +144,7 @@ class ClipRun:
             starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
+        decides = not patient and not self._goes_on(own)  # on which side all parts after it are
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
             attempt = self._attempt(start, own, objective, way)
             if attempt is None:
@@ -152,7 +153,7 @@ class ClipRun:
                 ended_early.append(attempt)
                 continue
             best = attempt if best is None or attempt.rank < best.rank else best
-            if best.free:
+            if best.free and not (decides and start.x.any()):
                 break
         assert best is not None
         missed = ""
@@ -216,18 +217,29 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
+        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends.
+
+        A part that goes on from another one is followed from its first posture before all.
+        """
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
+        movable, goes_on = bool((own.limits.lower < own.limits.upper).any()), self._goes_on(own)
+        if movable and goes_on:  # others are seldom on the side of things that it is on
+            yield own.deviations(followed(self._run, window, window.first, own.around[window.first]))
         yield none
-        if not (own.limits.lower < own.limits.upper).any():
-            return  # nothing can move
+        if not movable:
+            return
         if own.always:
             x = own.deviations(kept_beside(self._run, window, own.chart.original, own.always))
             if x.any():
                 yield x
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
-            yield own.deviations(followed(self._run, window, middle))
+            if not (goes_on and middle == window.first):
+                yield own.deviations(followed(self._run, window, middle))
+
+    def _goes_on(self, own: _Window) -> bool:
+        """Whether a window goes on from a posture that another one changed."""
+        return own.seams[0] and bool((own.around[own.window.first] != own.chart.original[0]).any())
 
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
