@@ -18,13 +18,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import Faults, dips
+from wholebody.motion.faults import DIP, Faults, depths_between, dips
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
-from wholebody.motion.trajectory.program import Limits
+from wholebody.motion.trajectory.program import ONE_STEP, Limits
 from wholebody.motion.trajectory.sqp import FAR, MET, End, WindowProgram
 from wholebody.motion.windows import Window
 
@@ -140,7 +140,7 @@ class ClipRun:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
             x = own.deviations(begun[window.first : window.end])
-            dipping = tuple(self._dips(own, x))
+            dipping = tuple(self._places(own, x, own.moved(x)))
             starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
@@ -246,7 +246,7 @@ class ClipRun:
         work = self._run.work
         program = WindowProgram(own.evaluator, objective, own.limits, SETTINGS.iterations)
         program.add(begun.between)
-        x, radius, near = begun.x, way.radius, list[Node]()
+        x, radius = begun.x, way.radius
 
         def report(count: int, worst: float) -> bool:
             return own.cancel(count / SETTINGS.iterations)
@@ -260,17 +260,23 @@ class ClipRun:
             x, radius = found.x, NEARLY
             if found.end is End.EARLY:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
-            near = self._dips(own, x)
+            dipping = self._dipping(own, x)
+            passes = way.largest is None and max(dipping.values(), default=0.0) > ONE_STEP
+            if not found.met or passes:  # rows bring nothing back that passes a thing; other starts are beside it
+                break
             before = len(program.nodes)
-            if found.met:
-                program.add(near)
+            program.add(self._places(own, x, dipping))
             if len(program.nodes) == before:
                 break
-        dipping = len({node.frame for node in near})
-        return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
+        return _Attempt(x, found.worst, len(dipping), found.objective, between=program.between)
 
-    def _dips(self, own: _Window, x: Array) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside these."""
-        found = dips(self._run.workspace, own.chart.postures(x), own.moved(x))
+    def _dipping(self, own: _Window, x: Array) -> dict[int, float]:
+        """Gaps of deviations x (n, nv) whose motions dip, and how deep [m]."""
+        depths = depths_between(self._run.workspace, own.chart.postures(x), own.moved(x))
+        return {gap: depth for gap, depth in depths.items() if depth > DIP}
+
+    def _places(self, own: _Window, x: Array, gaps: Iterable[int]) -> list[Node]:
+        """Places in gaps of deviations x (n, nv) where motions dip, and beside these."""
+        found = dips(self._run.workspace, own.chart.postures(x), gaps)
         places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
