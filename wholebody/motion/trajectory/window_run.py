@@ -7,7 +7,7 @@ pass. One whose shortfall stays is on the wrong side: others are tried before it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -137,14 +137,16 @@ class ClipRun:
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
         starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
-            starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
+            begins = self._starts(own, found.depths)
+            if not patient and not self._goes_on(own):  # on its side of things all parts after it are too
+                begins = _nearest_first(begins, objective)
+            starts = ((_Attempt(x), _Way(early=True)) for x in begins)
         else:
             x = own.deviations(begun[window.first : window.end])
             dipping = tuple(self._places(own, x, own.moved(x)))
             starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
-        decides = not patient and not self._goes_on(own)  # on which side all parts after it are
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
             attempt = self._attempt(start, own, objective, way)
             if attempt is None:
@@ -153,7 +155,7 @@ class ClipRun:
                 ended_early.append(attempt)
                 continue
             best = attempt if best is None or attempt.rank < best.rank else best
-            if best.free and not (decides and start.x.any()):
+            if best.free:
                 break
         assert best is not None
         missed = ""
@@ -280,3 +282,10 @@ class ClipRun:
         found = dips(self._run.workspace, own.chart.postures(x), gaps)
         places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
+
+
+def _nearest_first(starts: Iterable[Array], objective: Objective) -> Iterator[Array]:
+    """The first of deviations (n, nv) to begin with, then the others, by what is minimised."""
+    others = iter(starts)
+    yield next(others)
+    yield from sorted(others, key=objective.value)
