@@ -78,11 +78,14 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
     return q
 
 
-def followed(run: Run, window: Window, middle: int) -> Array:
-    """Postures (n, nq) of a window, followed from the freed posture of one of its frames until calm for 0.25 s."""
+def followed(run: Run, window: Window, middle: int, begun: Array | None = None) -> Array:
+    """Postures (n, nq) of a window, followed from one of its frames until calm for 0.25 s.
+
+    That frame begins at a posture (nq,), or at its own one freed.
+    """
     terms = run.terms
     q = np.array(terms.q[window.first : window.end])
-    q[middle - window.first] = run.follower.freed(middle, terms.q[middle])
+    q[middle - window.first] = run.follower.freed(middle, terms.q[middle]) if begun is None else begun
     for side, frames in ((1, range(middle + 1, window.end)), (-1, range(middle - 1, window.first - 1, -1))):
         calm = 0
         for frame in frames:

@@ -7,7 +7,7 @@ pass. One whose shortfall stays is on the wrong side: others are tried before it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -18,13 +18,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import Faults, dips
+from wholebody.motion.faults import DIP, Faults, depths_between, dips
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
-from wholebody.motion.trajectory.program import Limits
+from wholebody.motion.trajectory.program import ONE_STEP, Limits
 from wholebody.motion.trajectory.sqp import FAR, MET, End, WindowProgram
 from wholebody.motion.windows import Window
 
@@ -137,10 +137,13 @@ class ClipRun:
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
         starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
-            starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
+            begins = self._starts(own, found.depths)
+            if not patient and not self._goes_on(own):  # on its side of things all parts after it are too
+                begins = _nearest_first(begins, objective)
+            starts = ((_Attempt(x), _Way(early=True)) for x in begins)
         else:
             x = own.deviations(begun[window.first : window.end])
-            dipping = tuple(self._dips(own, x))
+            dipping = tuple(self._places(own, x, own.moved(x)))
             starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
@@ -216,25 +219,36 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
+        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends.
+
+        A part that goes on from another one is followed from its first posture before all.
+        """
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
+        movable, goes_on = bool((own.limits.lower < own.limits.upper).any()), self._goes_on(own)
+        if movable and goes_on:  # others are seldom on the side of things that it is on
+            yield own.deviations(followed(self._run, window, window.first, own.around[window.first]))
         yield none
-        if not (own.limits.lower < own.limits.upper).any():
-            return  # nothing can move
+        if not movable:
+            return
         if own.always:
             x = own.deviations(kept_beside(self._run, window, own.chart.original, own.always))
             if x.any():
                 yield x
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
-            yield own.deviations(followed(self._run, window, middle))
+            if not (goes_on and middle == window.first):
+                yield own.deviations(followed(self._run, window, middle))
+
+    def _goes_on(self, own: _Window) -> bool:
+        """Whether a window goes on from a posture that another one changed."""
+        return own.seams[0] and bool((own.around[own.window.first] != own.chart.original[0]).any())
 
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
         work = self._run.work
         program = WindowProgram(own.evaluator, objective, own.limits, SETTINGS.iterations)
         program.add(begun.between)
-        x, radius, near = begun.x, way.radius, list[Node]()
+        x, radius = begun.x, way.radius
 
         def report(count: int, worst: float) -> bool:
             return own.cancel(count / SETTINGS.iterations)
@@ -248,17 +262,30 @@ class ClipRun:
             x, radius = found.x, NEARLY
             if found.end is End.EARLY:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
-            near = self._dips(own, x)
+            dipping = self._dipping(own, x)
+            passes = way.largest is None and max(dipping.values(), default=0.0) > ONE_STEP
+            if not found.met or passes:  # rows bring nothing back that passes a thing; other starts are beside it
+                break
             before = len(program.nodes)
-            if found.met:
-                program.add(near)
+            program.add(self._places(own, x, dipping))
             if len(program.nodes) == before:
                 break
-        dipping = len({node.frame for node in near})
-        return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
+        return _Attempt(x, found.worst, len(dipping), found.objective, between=program.between)
 
-    def _dips(self, own: _Window, x: Array) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside these."""
-        found = dips(self._run.workspace, own.chart.postures(x), own.moved(x))
+    def _dipping(self, own: _Window, x: Array) -> dict[int, float]:
+        """Gaps of deviations x (n, nv) whose motions dip, and how deep [m]."""
+        depths = depths_between(self._run.workspace, own.chart.postures(x), own.moved(x))
+        return {gap: depth for gap, depth in depths.items() if depth > DIP}
+
+    def _places(self, own: _Window, x: Array, gaps: Iterable[int]) -> list[Node]:
+        """Places in gaps of deviations x (n, nv) where motions dip, and beside these."""
+        found = dips(self._run.workspace, own.chart.postures(x), gaps)
         places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
+
+
+def _nearest_first(starts: Iterable[Array], objective: Objective) -> Iterator[Array]:
+    """The first of deviations (n, nv) to begin with, then the others, by what is minimised."""
+    others = iter(starts)
+    yield next(others)
+    yield from sorted(others, key=objective.value)
