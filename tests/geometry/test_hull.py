@@ -35,6 +35,9 @@ def test_a_hull_of_a_mesh_holds_it_with_few_vertices(seed: int, count: int) -> N
     (piece,) = mesh_hull(cloud, faces).pieces
     assert piece.geometry.num_points <= max(HULL_VERTICES)
     assert outside(cloud, piece) < 1e-9
+    corners = np.array(piece.geometry.points()) + piece.placement.translation
+    beyond = np.maximum(cloud.min(axis=0) - corners.min(axis=0), corners.max(axis=0) - cloud.max(axis=0))
+    assert (beyond <= 1e-6 * np.ptp(cloud, axis=0)).all()  # a sole stays flat, and stands where it stood
 
 
 def test_a_small_hull_is_exact_and_its_added_volume_is_told() -> None:

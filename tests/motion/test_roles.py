@@ -211,20 +211,30 @@ def test_a_small_robot_with_a_stiff_trunk_is_known_by_its_axes(ahead: int, tmp_p
 
 
 def test_a_robot_of_legs_alone_is_known_where_it_walks(tmp_path: Path) -> None:
-    """Numbered joints of two legs; what stands in the world on them is no walker, and what hangs upward has no legs."""
+    """Numbered joints of two legs; what stands in the world on them is no walker, and what hangs upward has no legs.
+
+    It looks along y, LR is of the legs the right one, and thighs swing 5 cm beside the hips.
+    """
     for down in (-1.0, 1.0):
         links = []
-        for side, sign in (("L", 1), ("R", -1)):
-            links += [("base", f"{side}1", (0, 0.1 * sign, 0), 0.02, "x"), (f"{side}1", f"{side}2", (0,) * 3, 0.1, "y")]
+        for side, x in (("LL_", -1), ("LR_", 1)):
+            links += [("base", f"{side}1", (0.1 * x, 0, 0), 0.02, "y"), (f"{side}1", f"{side}2", (0,) * 3, 0.1, "x")]
             links += [
-                (f"{side}2", f"{side}3", (0, 0, 0.3 * down), 0.1, "y"),
-                (f"{side}3", f"{side}4", (0, 0, 0.3 * down), 0.05, "y"),
+                (f"{side}2", f"{side}3", (0.05 * x, 0.01, 0.3 * down), 0.1, "x"),
+                (f"{side}3", f"{side}4", (0, 0, 0.3 * down), 0.05, "x"),
             ]
         figure = robot(tmp_path, links)
         legs = {"hip": 2, "knee": 3, "ankle": 4}
-        known = {f"{side}_{part}": f"{side[0].upper()}{k}_j" for side in ("left", "right") for part, k in legs.items()}
+        known = {
+            f"{side}_{part}": f"L{side[0].upper()}_{k}_j" for side in ("left", "right") for part, k in legs.items()
+        }
         assert built_figure(figure) == (known if down < 0.0 else {})
         assert built_figure(wb.load(tmp_path / "robot.urdf")) == {}
+        if down < 0.0:
+            q, found = upright(figure), matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None)
+            assert figure.placement(q, "LL_3").translation == pytest.approx([0.01, 0.15, -0.3])
+            joint, place = found.places(figure)["left_hip"]
+            assert figure.placement(q, figure.model.names[joint]).act(place) == pytest.approx([0.0, 0.15, 0.0])
 
 
 def test_a_quadruped_is_no_person(tmp_path: Path) -> None:

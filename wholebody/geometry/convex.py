@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 HULL_VERTICES = (64, 48)
 """A hull of a whole mesh with more vertices than the first number gets as many as the second. With 32 the hulls of real
-robots have 12 % more volume than with all their vertices, with 48 they have 6 %, and with 64 they have 4 %. Contacts
+robots have 11 % more volume than with all their vertices, with 48 they have 6 %, and with 64 they have 4 %. Contacts
 have more rows with more vertices."""
 
 VERTICES, CONCAVITY = Range(8, 256, whole=True), Range(0.01, 1.0)

@@ -160,7 +160,8 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:
     """Vertices (k, 3) of a convex polytope around points (n, 3) with at most `max_vertices`, 8 or more."""
-    # A box along principal axes; each cut uses the hull's plane that removes most at the farthest vertex.
+    # The box along the axes, which soles and other flat sides of parts in CAD are parallel to, so that these stay flat;
+    # each cut uses the hull's plane that removes most at the farthest vertex.
     from scipy.spatial import ConvexHull, QhullError
 
     hull = ConvexHull(points)
@@ -168,8 +169,7 @@ def simplified_hull(points: Array, max_vertices: int) -> Array:
     if len(corners) <= max_vertices:
         return np.asarray(corners)
     inside = corners.mean(axis=0)
-    axes = np.linalg.svd(corners - inside, full_matrices=False)[2]
-    box = np.vstack([axes, -axes])
+    box = np.vstack([np.eye(3), -np.eye(3)])
     planes = np.column_stack([box, -(corners @ box.T).max(axis=0)])
     best = _vertices(planes, inside)
     faces = _apart(hull.equations)

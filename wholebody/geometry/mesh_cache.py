@@ -70,7 +70,7 @@ def cache_folder() -> Path:
 
 def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
     """Pieces from the cache, or made and cached, by content, settings and libraries; notes begin with `what`."""
-    digest = hashlib.sha256("\0".join(("1", __version__, settings)).encode())
+    digest = hashlib.sha256("\0".join(("2", __version__, settings)).encode())
     for part in content:
         digest.update(hashlib.sha256(part).digest())
 

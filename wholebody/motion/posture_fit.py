@@ -31,7 +31,7 @@ from wholebody.terms.residual_kernel import cones as cone_angles
 STEP = 0.6  # rad: largest change of a joint in one step; beyond it the linearisation says little
 CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
 DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
-WITHIN, CLEARANCE = 0.06, 5e-4  # m: nearer pairs have rows; distance that they keep
+WITHIN, CLEARANCE = 0.01, 5e-4  # m: nearer pairs have rows; distance that they keep
 PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price

@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import LIMBS, built, built_figure, link_end, side_of
+from wholebody.motion.structure import LIMBS, built, built_figure, link_end, side_of, thigh_start
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
@@ -35,7 +35,8 @@ class Roles(NamedTuple):
     # roles of the figure that no joint of the skeleton is known to have, if there are others to name
     missing: tuple[str, ...] = ()
     by_structure: tuple[str, ...] = ()  # roles whose joints are known by the skeleton's structure alone
-    # where in its frame (3,) a wrist is of which the forearm ends without a joint, metres; others are where frames are
+    # where in its frame (3,) a part is that is not at it, metres: a wrist of which the forearm ends without a joint, a
+    # hip beside its thigh
     ends: Mapping[str, Array] = MappingProxyType({})
 
     def places(self, figure: Figure) -> dict[str, tuple[int, Array]]:
@@ -83,12 +84,14 @@ def matched(
 
 
 def _ends(figure: Figure, frames: Mapping[str, str]) -> dict[str, Array]:
-    """Where wrists are that have the frames of their elbows."""
-    found = {}
+    """Where wrists are that have the frames of their elbows, and hips beside their thighs."""
+    found, joints = {}, set(figure.joints)
     for role, name in frames.items():
+        frame = figure.model.frames[figure.frame_id(name)]
         if role.endswith("wrist") and name == frames.get(role.replace("wrist", "elbow")):
-            frame = figure.model.frames[figure.frame_id(name)]
             found[role] = frame.placement.actInv(link_end(figure, frame.parentJoint))
+        elif role.endswith("hip") and {name, knee := frames.get(role.replace("hip", "knee"))} <= joints:
+            found[role] = thigh_start(figure, *map(figure.model.getJointId, (name, knee)))
     return found
 
 

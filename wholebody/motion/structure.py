@@ -150,7 +150,7 @@ def _sided(motion: SkeletonMotion, places: Array, pair: list[_Limb], legs: list[
 
 def side_of(name: str) -> int:
     """1 for a name of the left side, -1 for one of the right, 0 for neither."""
-    plain = re.sub(r"^.*[:|]", "", name)
+    plain = re.sub(r"^.*[:|]|(?<![A-Za-z])[LR](?=[LR](?![A-Za-z]))", "", name)  # LR_knee: of the legs the right one
     side = re.search(r"left|right", plain, re.IGNORECASE) or re.search(
         r"(?:^|(?<=[^A-Za-z]))([LRlr])(?=[^a-z]|$)|(?<=[a-z])([LR])$", plain
     )
@@ -178,6 +178,21 @@ def link_end(figure: Figure, joint: int) -> Array:
     end, axis = 0.5 * (low + high), int(np.argmax(np.maximum(high, -low)))
     end[axis] = high[axis] if high[axis] > -low[axis] else low[axis]
     return np.asarray(end)
+
+
+def thigh_start(figure: Figure, hip: int, knee: int) -> Array:
+    """(3,) where a thigh starts, in the axes of the hip's joint, metres: where that is, or beside the knee.
+
+    A hinge is anywhere along its axis: that of a hip which turns as the knee does is in the plane of the knee's swing.
+    """
+    model, data = figure.model, figure.model.createData()
+    columns = pin.computeJointJacobians(model, data, upright(figure)).reshape(6, -1)[3:].T
+    if not model.joints[hip].nv == model.joints[knee].nv == 1:
+        return np.zeros(3)
+    axis, other = (columns[model.joints[joint].idx_vExtended] for joint in (hip, knee))
+    way = data.oMi[knee].translation - data.oMi[hip].translation
+    # cosine of the angle between the axes
+    return np.asarray(data.oMi[hip].rotation.T @ axis * (axis @ way) * (abs(axis @ other) > 0.99))
 
 
 def built_figure(figure: Figure) -> dict[str, str]:
