@@ -24,7 +24,7 @@ def streamed(stream: wb.motion.Retargeter, motion: SkeletonMotion) -> np.ndarray
 
 
 def test_a_stream_gives_the_postures_of_the_recording(human: wb.Figure) -> None:
-    motion, stands = walker(flat, 2.4)
+    motion, stands = walker(flat, 2.1)
     ground = wb.motion.ground(motion)
     batch = wb.retarget(motion, human, ground=ground)
     stream = wb.motion.Retargeter(motion, human, ground=ground)
