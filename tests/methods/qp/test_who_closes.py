@@ -7,7 +7,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.qp.solvers import registry
-from wholebody.methods.qp.solvers.registry import solver_names
+from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
 NAMED = [name for name in solver_names() if name != "active_set"]
 
@@ -140,3 +140,11 @@ def test_with_a_hot_start_osqp_is_not_asked_for_long(random_program, monkeypatch
     assert len(limits) == rounds
     assert answer.exact
     assert answer.by == "semismooth newton"
+
+
+def test_programs_are_counted_until_they_are_asked_for():
+    solver = make_solver("osqp")
+    for by in ("osqp", "active set", "osqp"):
+        assert solver.count(by) == by
+    assert solver.counted() == {"osqp": 2, "active set": 1}
+    assert solver.counted() == {}
