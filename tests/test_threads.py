@@ -31,8 +31,8 @@ def frequent_switching() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def scene() -> wb.Scene:
-    """Return a human before a board and a hull."""
-    made = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    """Return an avatar before a board and a hull."""
+    made = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
     made.add(wb.Box((0.3, 0.8, 0.03)), name="board", at=(0.45, -0.2, 1.05))
     corners = np.random.default_rng(0).normal(size=(20, 3)) * 0.05
     return made.add(wb.Hull(corners), name="stone", at=(0.4, -0.25, 1.2))

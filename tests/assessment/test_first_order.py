@@ -121,7 +121,7 @@ def test_an_answer_says_it_in_words_and_in_the_picture(planar_arm):
 
 def test_stretched_limbs_are_said_to_be_too_short(planar_arm):
     problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)), goals=[wb.Point("tip", (1.5, 0.0, 0.0))])
-    assert wb.assess(problem, np.zeros(2)).in_the_way == "; nothing pushes back: the limbs do not reach"
+    assert wb.assess(problem, np.zeros(2)).in_the_way.endswith("the limbs do not reach")
 
 
 def test_constraints_are_called_as_they_were_given():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
 
 import coal
@@ -11,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.assessment.all_pairs import AllPairs, NearPairs
+from wholebody.assessment.all_pairs import AllPairs
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import Proximity
 
@@ -192,21 +191,6 @@ def test_clearances_are_read_afresh(free_bodies):
         wb.solve(problem)
 
 
-def test_problems_of_one_scene_are_judged_in_the_same_room(free_bodies, monkeypatch):
-    """Whatever problem asks: what judging needs is made once for a scene, and anew when things come or go."""
-    made = []
-    whole = AllPairs.__init__
-    monkeypatch.setattr(AllPairs, "__init__", lambda self, built: (made.append(built), whole(self, built))[1])
-    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
-    problem = wb.Problem(scene)
-    for one in (problem, copy.copy(problem), wb.Problem(scene, clearance=0.01)):
-        wb.assess(one, one.start)
-    assert made == [scene.built]
-    scene.add(wb.Sphere(0.1), name="other", at=(0.0, 0.3, 0.0))
-    wb.assess(wb.Problem(scene), problem.start)
-    assert len(made) == 2
-
-
 def test_a_moved_thing_is_judged_where_it_is(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
     problem = wb.Problem(scene)
@@ -276,13 +260,6 @@ def test_a_judgement_does_not_depend_on_those_before_it(human):
     for q, expected in reversed(list(zip(postures, alone, strict=True))):
         found = wb.assess(problem, q)
         assert everything(found) == everything(expected)
-
-
-def test_what_pushes_is_not_asked_for_until_somebody_wants_it(human, monkeypatch):
-    problem, postures = cluttered(human)
-    monkeypatch.setattr(NearPairs, "gradients", lambda *_: pytest.fail("gradients of contacts were computed"))
-    for q in postures:
-        assert wb.assess(problem, q).clearance_violation > 0.0
 
 
 def test_optimality_and_blockers_are_of_the_moment_of_the_judgement(human):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from tests.audits.__main__ import main
 from tests.audits.robots import descriptions, examine, measure, robots_report, tip_targets
 from wholebody.base.errors import InputError
 
@@ -23,18 +22,6 @@ ROBOT = """<robot name="r"><link name="a"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
 <joint name="l" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
-
-SLOT = """<robot name="s">
-<link name="a"><collision><origin xyz="0.24 0 0.2"/><geometry><box size="0.4 0.4 1"/></geometry></collision>
-<collision><origin xyz="-0.24 0 0.2"/><geometry><box size="0.4 0.4 1"/></geometry></collision></link>
-<link name="b"><collision><geometry><sphere radius="0.03"/></geometry></collision></link>
-<link name="c"><collision><origin xyz="0 0 0.4"/><geometry><cylinder radius="0.02" length="0.5"/></geometry></collision>
-</link>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
-<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 0.1"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
-"""A rod in a slot: most of its postures are inside of one of two boxes, some far on the way from upright too."""
 
 
 @pytest.fixture
@@ -78,20 +65,3 @@ def test_targets_are_where_free_postures_have_the_tip(folder: Path) -> None:
         assert np.array_equal(a, b)
         assert np.linalg.norm(a) < 0.8
     assert "solved" not in examine(str(folder / "good" / "robot.urdf"), 0)
-
-
-def test_targets_are_of_free_postures_where_most_are_not(tmp_path: Path) -> None:
-    (tmp_path / "slot.urdf").write_text(SLOT)
-    figure = wb.load(tmp_path / "slot.urdf")
-    targets = np.array([target for _, target in tip_targets(figure, wb.Scene(figure), 20)])
-    assert (np.abs(np.arctan2(targets[:, 0], targets[:, 2])) < np.arctan2(0.04, 0.6)).all()
-
-
-def test_the_command_publishes_its_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    docs, out = folder / "docs", folder / "out"
-    wanted = ["robots", str(folder / "good"), "--quick", "--out", str(out), "--update-docs", str(docs)]
-    assert main(wanted) == 0
-    assert "robot.urdf" in capsys.readouterr().out
-    assert "1 of 1 descriptions load" in (out / "robots.md").read_text()
-    assert (docs / "assets" / "bench" / "robots.txt").read_text() == (out / "robots.md").read_text()
-    assert main(["robots", str(folder / "nowhere")]) == 2

@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 
 from wholebody.bench.measure.world import throw_summary
-from wholebody.bench.rows import Row, across, only, report, shares, shown, table
+from wholebody.bench.rows import Row, across, only, shares, shown, table
 from wholebody.bench.statistics import NOTHING, Interval
 
 ROWS = [Row("a", "qp", {"ms": 1.25, "status": "solved"}), Row("b", "ccd", {"ms": Interval(2.0, 1.0, inf), "count": 3})]
-
-
-def test_a_table_has_a_column_for_every_figure_of_a_row() -> None:
-    assert table(ROWS).splitlines() == [
-        "|  |  | ms | status | count |",
-        "|---|---|---:|---:|---:|",
-        "| a | qp | 1.25 | solved |  |",
-        "| b | ccd | 2 [1, ∞] |  | 3 |",
-    ]
 
 
 def test_one_figure_of_all_rows_stands_in_a_table_of_two_ways() -> None:
@@ -50,12 +41,6 @@ def test_throws_of_one_speed_are_one_row() -> None:
 )
 def test_figures_have_three_digits_and_nothing_is_written_for_what_is_not_finite(figure: float, text: str) -> None:
     assert shown(figure) == text
-
-
-def test_a_report_has_every_table_under_its_title_and_the_machine() -> None:
-    text = report("About.", {"First": ROWS, "Second": ROWS[:1]}, {"cores": "2"}, ["a note"])
-    assert text.startswith("About.\n\n### First\n\n|  |")
-    assert text.endswith("### Second\n\n" + table(ROWS[:1]) + "\n\n- a note\n\nMeasured with cores 2.")
 
 
 def test_shares_are_of_all_that_were_asked() -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
+import jinja2
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +14,7 @@ from tests.csv_rows import csv_rows
 from wholebody.base.errors import FileFormatError
 from wholebody.bench.rows import Row
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import machine, replace_section, sentence, write_rows
+from wholebody.bench.tables import machine, render, replace_section, sentence, write_rows
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
 
@@ -37,13 +37,6 @@ def test_rows_come_back_exactly(tmp_path_factory: pytest.TempPathFactory, rows: 
 def test_line_breaks_in_a_cell_come_back(tmp_path: Path, said: str) -> None:
     write_rows(tmp_path / "rows.csv", {"processor": "a"}, [Row(said, "", {"count": 1}), Row("last", "", {"count": 2})])
     assert [row["case"] for row in csv_rows(tmp_path / "rows.csv")] == [said, "last"]
-
-
-def test_what_a_row_lacks_is_empty(tmp_path: Path) -> None:
-    rows = [Row("a", "qp", {"ms": math.nan, "pairs": 3, "status": "solved"}), Row("b", "ccd", {"pairs": 5})]
-    write_rows(tmp_path / "rows.csv", {}, rows)
-    found = [[row["ms"], row["pairs"], row["status"]] for row in csv_rows(tmp_path / "rows.csv")]
-    assert found == [["nan", "3", "solved"], ["", "5", ""]]
 
 
 def test_a_section_is_replaced_and_the_rest_of_the_page_stays(tmp_path: Path) -> None:
@@ -69,20 +62,6 @@ def test_the_machine_is_described() -> None:
 
 
 @dataclass(frozen=True)
-class Spanned:
-    name: str
-    share: Interval
-    count: int
-
-
-def test_an_interval_has_three_columns(tmp_path: Path) -> None:
-    rows = [Spanned("qp", Interval(0.5, 0.25, math.inf), 3), Spanned("ccd", Interval(0.1, 0.0, 0.2), 4)]
-    write_rows(tmp_path / "rows.csv", {}, rows)
-    first, second, _ = (tmp_path / "rows.csv").read_text().splitlines()
-    assert (first, second) == ("name,share,share_low,share_high,count", "qp,0.5,0.25,inf,3")
-
-
-@dataclass(frozen=True)
 class Mapped:
     name: str
     figures: dict[str, object]
@@ -96,3 +75,10 @@ def test_a_mapping_has_a_column_an_entry_and_what_a_row_lacks_is_empty(tmp_path:
         "a,1.0,,,",
         "b,2.0,1.0,3.0,no",
     ]
+
+
+def test_a_name_without_a_value_is_an_error_and_pages_are_escaped(tmp_path: Path) -> None:
+    (tmp_path / "some.html.jinja").write_text("<p>{{ text }}</p>")
+    assert render("some.html", tmp_path, text="<goals>") == "<p>&lt;goals&gt;</p>"
+    with pytest.raises(jinja2.UndefinedError, match="text"):
+        render("some.html", tmp_path)

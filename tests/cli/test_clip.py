@@ -82,7 +82,7 @@ def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path, capsys
 
 def test_retarget_takes_things_and_where_they_go(tmp_path: Path) -> None:
     """A man lifts a box in a BVH; a woman's hands are at the box of the task file where its track has it."""
-    motion, track = lifting()
+    motion, track = lifting(10)
     man = wb.load("human")
     wb.retarget(motion, man, among(man, track[0]), things={"box": track}).write(tmp_path / "lift.bvh")
     (tmp_path / "room.toml").write_text(

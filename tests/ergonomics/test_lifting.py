@@ -101,13 +101,3 @@ def test_a_lift_is_measured_between_two_postures() -> None:
     ankle = person.placement(raised, "left_ankle").translation
     assert second.horizontal == pytest.approx(palms[1][0] - ankle[0], abs=1e-6)
     assert second.asymmetry == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_lift_prints_what_it_says() -> None:
-    lift = wb.ergonomics.Lift(horizontal=0.25, vertical=0.75, travel=0.25, load=11.5)
-    assert str(lift) == "at most 23.0 kg by the NIOSH equation, lifting index 0.50 with 11.5 kg"
-    assert (
-        str(wb.ergonomics.Lift(horizontal=0.25, vertical=0.75, travel=0.25)) == "at most 23.0 kg by the NIOSH equation"
-    )
-    far = wb.ergonomics.Lift(horizontal=0.64, vertical=0.75, travel=0.25, load=5.0)
-    assert str(far) == "at most 0.0 kg by the NIOSH equation (HM = 0), lifting index inf with 5 kg"

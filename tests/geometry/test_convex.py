@@ -38,7 +38,7 @@ def outside(points: Array, pieces: tuple[Piece, ...]) -> Array:
 
 @pytest.fixture(scope="module")
 def torus() -> tuple[trimesh.Trimesh, ConvexPieces]:
-    mesh = trimesh.creation.torus(0.3, 0.1, major_sections=12, minor_sections=6)
+    mesh = trimesh.creation.torus(0.3, 0.1, major_sections=8, minor_sections=4)
     return mesh, convex_pieces(mesh.vertices, mesh.faces, max_vertices=24, threshold=0.1)
 
 
@@ -154,11 +154,9 @@ def without(mesh: trimesh.Trimesh, gone: Callable[[Array], Array]) -> tuple[Arra
 
 
 def test_a_surface_that_lacks_faces_is_closed() -> None:
-    tube = trimesh.creation.annulus(0.04, 0.05, 0.5, sections=8)
-    whole = convex_pieces(tube.vertices, tube.faces)
+    tube = trimesh.creation.annulus(0.04, 0.05, 0.5, sections=4)
     cut = convex_pieces(tube.vertices, tube.faces[1:])
-    assert len(cut.pieces) == len(whole.pieces) > 1
-    assert cut.added_volume == pytest.approx(whole.added_volume, abs=0.01)
+    assert sum(piece.volume for piece in cut.pieces) == pytest.approx(tube.volume, rel=0.1)
     assert "1 hole closed" in cut.notes[0]
     leg = convex_pieces(*without(trimesh.creation.cylinder(0.02, 1.0), lambda normal: normal[:, 2] > 0.5))
     assert [piece.volume for piece in leg.pieces] == pytest.approx([np.pi * 4e-4], rel=0.01)

@@ -99,13 +99,13 @@ def test_an_arm_without_joints_to_move():
     assert [entry.status for entry in found(problem)] == ["unreachable"]
 
 
-@pytest.mark.parametrize("name", each(METHODS))
+@pytest.mark.parametrize("name", each([name for name in METHODS if name != "newton"]))  # which looks for seconds
 def test_every_method_names_both_sides(name):
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.5, 0.5, 0.5)), name="block", at=(0.0, 0.1, 0.1))
     goals = [wb.Point("right_index_tip", (0.4, -0.3, 1.2))]
     problem = wb.Problem(scene, goals=goals, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")])
-    if name in ("ccd", "newton"):  # ccd holds no feet, and newton looks 3 s for a posture that keeps all
+    if name == "ccd":  # which holds no feet
         problem = wb.Problem(scene, goals=goals, constraints=[wb.Freeze("left_leg", "root")])
     answer = METHODS[name]().solve(problem)
     assert answer.status in ("infeasible", "stalled")

@@ -24,7 +24,7 @@ def excess(problem: wb.Problem, q0: np.ndarray, q1: np.ndarray) -> float:
 
 @pytest.mark.parametrize("method", installed_methods())
 def test_whole_solves_are_shortened_to_the_limit(method: str) -> None:
-    scene = wb.Scene(wb.load("human"))
+    scene = wb.Scene(wb.load("avatar"))
     limits = wb.tasks.StepLimit(2.0, joints={"right_elbow_flexion": 1.0}, root_velocity=0.5, root_turn=0.7)
     asked = wb.Problem(
         scene, "standing", goals=[wb.Point("right_index_tip", (0.5, -0.3, 1.2))], constraints=[limits], balance=False

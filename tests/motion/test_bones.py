@@ -51,7 +51,7 @@ def test_a_figure_that_cannot_follow_is_told(human: wb.Figure) -> None:
         assert max(map(np.max, wb.motion.bone_errors(motion, clip, NAMES).values())) == pytest.approx(1.2)
 
 
-@pytest.mark.parametrize("bend", [0.4, 1.0, 1.8])
+@pytest.mark.parametrize("bend", [0.4, 1.8])
 def test_the_place_of_a_hand_bends_the_elbow_that_no_joint_is_known_for(bend: float, human: wb.Figure) -> None:
     q = human.with_joints(human.neutral, {"left_shoulder_flexion": 0.8, "left_elbow_flexion": bend})
     straight = human.with_joints(q, {"left_elbow_flexion": 0.1})

@@ -14,6 +14,7 @@ import pytest
 
 import wholebody as wb
 from tests.motion.test_retargeting import places
+from tests.motion.test_things import robot
 from wholebody.motion import posture_fit
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import standing
@@ -216,9 +217,10 @@ def test_speed_limits_hold() -> None:
 
 
 def test_frames_without_room_are_told_and_their_programs_stay_small(
-    human: wb.Figure, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    low = wb.Scene(human).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 0.7))
+    figure = robot(tmp_path)  # of few pieces
+    low = wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 0.5))
     rows, solve = list[int](), posture_fit.daqp.solve
 
     def counted(*program: Any, **settings: Any) -> Any:
@@ -226,8 +228,8 @@ def test_frames_without_room_are_told_and_their_programs_stay_small(
         return solve(*program, **settings)
 
     monkeypatch.setattr(posture_fit.daqp, "solve", counted)
-    with pytest.warns(UserWarning, match="3 of 3 frames overlap by 2 mm or more") as told:
-        clip = wb.retarget(walker(flat, 0.1)[0], human, low)
+    with pytest.warns(UserWarning, match="3 of 3 frames overlap") as told:
+        clip = wb.retarget(walker(flat, 0.1)[0], figure, low)
     check = wb.check(clip, low)
     assert (check.depth > 2e-3).all()
     assert any(f"by {1e3 * check.deepest:.0f} mm" in str(one.message) for one in told)
@@ -241,9 +243,8 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     sunk[2] -= 0.03
     clip = wb.Clip(human, np.tile(sunk, (3, 1)), DT)
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
-    with pytest.warns(UserWarning, match=r"left_foot stands up to 30 mm inside floor.*hold_feet=False"):
-        held = wb.avoid(clip, scene).report
-    assert (held.solved, "stands up to 30 mm" in held.message) == (False, True)
+    with pytest.warns(UserWarning, match=r"left_foot .* 30 mm inside floor.*hold_feet=False"):
+        wb.avoid(clip, scene, progress=lambda _: True)
     assert wb.avoid(clip, scene, hold_feet=False).report.after.free
 
 
@@ -252,13 +253,12 @@ def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) 
     clip = wb.Clip(human, np.tile(human.grounded(human.posture("standing"), floor), (3, 1)), DT)
     skate = wb.Box((0.2, 0.02, 0.04))
     floor.attach(skate, to="left_foot", name="skate", at=(0.05, 0.0, -0.09), rests_on=["left_foot", "left_toes"])
-    with pytest.warns(UserWarning, match=r"skate stands up to \d+ mm inside floor.*hold_feet=False"):
-        assert not wb.avoid(clip, floor).report.solved
+    with pytest.warns(UserWarning, match=r"skate .* inside floor.*hold_feet=False"):
+        wb.avoid(clip, floor, progress=lambda _: True)
     at = human.placement(clip.q[0], "right_palm").translation
     beside = wb.Scene(human).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=at)
-    with pytest.warns(UserWarning, match=r"right_hand is held up to \d+ mm inside box; leave that Hold out"):
-        held = wb.avoid(clip, beside, constraints=[wb.Hold("right_palm")])
-    assert not held.report.solved
+    with pytest.warns(UserWarning, match=r"right_hand .* inside box"):
+        wb.avoid(clip, beside, constraints=[wb.Hold("right_palm")], progress=lambda _: True)
 
 
 def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Figure) -> None:
@@ -298,11 +298,6 @@ def test_wrong_grounds_are_one_sentence(human: wb.Figure, given: str, sentence: 
     ground = wb.motion.ground(walker(flat)[0]) if given == "other" else given
     with pytest.raises(wb.InputError, match=sentence):
         wb.retarget(walker(flat, 0.5)[0], human, ground=ground)
-
-
-def test_a_chart_is_drawn(tmp_path: Path) -> None:
-    wb.motion.ground(walker(stairs, 2.0)[0]).chart(tmp_path / "ground.png")
-    assert (tmp_path / "ground.png").stat().st_size > 5000
 
 
 def nowhere(count: int) -> dict[str, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -218,9 +219,15 @@ CONVENTIONS = {
 }  # fmt: skip
 
 
+@cache
+def retargeted() -> tuple[SkeletonMotion, wb.Clip]:
+    """A short motion of a skeleton whose names are ours, and what becomes of it."""
+    return person(6), wb.retarget(person(6), wb.load("human"))
+
+
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_skeletons_of_other_names_are_the_same_motion(convention: str, human: Figure) -> None:
-    motion, table = person(6), CONVENTIONS[convention]
+    (motion, alone), table = retargeted(), CONVENTIONS[convention]
 
     def named(joint: str) -> str:
         side, _, part = joint.rpartition("_")
@@ -229,7 +236,7 @@ def test_skeletons_of_other_names_are_the_same_motion(convention: str, human: Fi
 
     names = tuple(map(named, motion.names))
     other = SkeletonMotion(names, motion.parents, motion.offsets, motion.rotations, motion.positions, motion.dt)
-    assert furthest(wb.retarget(other, human), wb.retarget(motion, human)) < 1e-9
+    assert furthest(wb.retarget(other, human), alone) < 1e-9
 
 
 def test_bones_that_all_rest_along_one_axis_are_the_same_motion(human: Figure) -> None:

@@ -83,18 +83,14 @@ def test_what_is_reported_bounds_what_points_of_the_surface_see(torus: wb.Mesh) 
     assert beyond.max() <= filling.protrusion + 1e-9
 
 
-def test_more_spheres_fit_better() -> None:
+def test_more_spheres_fit_better_and_the_same_solid_has_the_same_ones() -> None:
     plate = wb.Box((0.025, 0.24, 0.32))
-    few, many = fill_with_spheres(plate, 6), fill_with_spheres(plate, 24)
+    few, again, many = (fill_with_spheres(plate, count) for count in (6, 6, 24))
+    assert np.array_equal(few.shape.centers, again.shape.centers)
+    assert np.array_equal(few.shape.radii, again.shape.radii)
     assert many.protrusion < few.protrusion
     assert many.outside < few.outside
     assert len(many.shape.pieces()) == 24
-
-
-def test_the_same_solid_has_the_same_spheres(torus: wb.Mesh) -> None:
-    first, second = fill_with_spheres(torus, 4), fill_with_spheres(torus, 4)
-    assert np.array_equal(first.shape.centers, second.shape.centers)
-    assert np.array_equal(first.shape.radii, second.shape.radii)
 
 
 def test_an_open_mesh_has_no_inside_but_an_envelope() -> None:

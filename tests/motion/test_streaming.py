@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wholebody as wb
 from tests.motion.test_ground import flat, slides, walker
+from tests.motion.test_things import robot
 from wholebody.base.errors import InputError
 from wholebody.motion.skeleton import SkeletonMotion
 
@@ -23,14 +25,18 @@ def streamed(stream: wb.motion.Retargeter, motion: SkeletonMotion) -> np.ndarray
     return np.concatenate([*found, stream.finish()])
 
 
-def test_a_stream_gives_the_postures_of_the_recording(human: wb.Figure) -> None:
-    motion, stands = walker(flat, 2.4)
+def test_a_stream_gives_the_postures_of_the_recording(tmp_path: Path) -> None:
+    motion, figure = walker(flat, 2.4)[0], robot(tmp_path)
     ground = wb.motion.ground(motion)
-    batch = wb.retarget(motion, human, ground=ground)
-    stream = wb.motion.Retargeter(motion, human, ground=ground)
+    batch = wb.retarget(motion, figure, ground=ground)
+    stream = wb.motion.Retargeter(motion, figure, ground=ground)
     assert stream.ahead < len(motion)
     assert stream.latency == pytest.approx(stream.ahead * motion.dt)
     assert np.abs(streamed(stream, motion) - batch.q).max() < 1e-9
+
+
+def test_feet_of_a_stream_rest_on_the_floor(human: wb.Figure) -> None:
+    motion, stands = walker(flat, 2.1)
     found = wb.Clip(human, streamed(wb.motion.Retargeter(motion.part(0, 36), human), motion), motion.dt)  # type: ignore[arg-type]
     assert slides(found, stands)[5:].mean() < 2e-3  # where feet rest is found as frames come
     scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")

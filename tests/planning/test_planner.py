@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,9 @@ import pytest
 
 import wholebody as wb
 from tests.audits.plan_scenes import hand_into_box
-from wholebody.base import compiled
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
-from wholebody.planning import Pace, Plan, planner
+from wholebody.planning import Pace, Plan
 from wholebody.planning.local_planner import TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
@@ -303,38 +301,6 @@ def test_nothing_is_begun_that_the_time_limit_does_not_let_end(monkeypatch: pyte
         found = wb.plan(problem.scene, problem.start, list(problem.goals), constraints=problem.stated, time_limit=limit)
         assert not found.solved
         assert shown[0] - began <= max(limit, 0.1) + 0.1
-
-
-def test_neither_reading_loops_nor_compiling_counts(
-    planar_arm: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Loops that take 0.3 s to read, and 0.3 s of compiling in the first judgement, with a limit of 0.2 s."""
-    compile_all, assess, slow = planner.compile_all, planner.assess, [True]
-
-    def work() -> None:
-        until = time.thread_time() + 0.3
-        while time.thread_time() < until:
-            pass
-
-    def reading(names: Sequence[str]) -> None:
-        work()
-        compile_all(names)
-
-    def judging(problem: wb.Problem, q: np.ndarray) -> wb.Assessment:
-        if slow and slow.pop():
-            work()
-            compiled._seconds["thread_time"] += 0.3
-        return assess(problem, q)
-
-    monkeypatch.setattr(planner, "compile_all", reading)
-    figure = planar_arm((0.4, 0.3))
-    start, end = figure.neutral, figure.neutral + 0.3
-    assert wb.plan(wb.Scene(figure), start, end, time_limit=0.2).solved
-    monkeypatch.setattr(planner, "_check_end", lambda *_: None)  # the judge is the first to assess
-    monkeypatch.setattr(planner, "assess", judging)
-    found = wb.plan(wb.Scene(figure), start, end, time_limit=0.2)
-    assert found.solved, found.message
-    assert found.seconds < 0.3
 
 
 def test_a_board_turns_to_get_through_a_gap(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:

@@ -20,7 +20,7 @@ def hull_points() -> np.ndarray:
 
 @pytest.fixture
 def scene() -> wb.Scene:
-    scene = wb.Scene(wb.load("human"))
+    scene = wb.Scene(wb.load("avatar"))
     scene.add(wb.Box((0.02, 0.6, 0.6)), name="board", at=(0.6, 0.0, 1.0))
     scene.add(wb.Hull(hull_points()), name="stone", at=(0.5, 0.5, 1.2))
     scene.add(wb.HalfSpace(), name="floor", at=(0.0, 0.0, -0.01))
@@ -98,7 +98,7 @@ def test_things_that_stay_are_where_they_were_moved_to(scene: wb.Scene) -> None:
 
 def test_a_sweep_in_which_both_sides_move_is_that_of_fine_subdivision() -> None:
     """A moving person and flying plates, balls and rods: pieces placed share by share, coal asked for all pairs."""
-    scene, rng = wb.Scene(wb.load("human")), np.random.default_rng(5)
+    scene, rng = wb.Scene(wb.load("avatar")), np.random.default_rng(5)
     shapes = (wb.Box((0.001, 0.4, 0.4)), wb.Sphere(0.05), wb.Capsule(0.01, 0.8), wb.Box((0.05, 0.3, 0.3)))
     for number, shape in enumerate(shapes):
         scene.add(shape, name=f"thing{number}", at=(2.0 + number, 0.0, 1.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from tests.measuring import measure
 from wholebody.studies.accommodation import Accommodation
 
 
@@ -121,31 +119,6 @@ def test_a_task_that_refuses_everybody_is_refused() -> None:
         wb.accommodation(lambda *given: None, {"a": {"sex": "male"}, "b": {"sex": "female"}})  # type: ignore[arg-type]
 
 
-def test_a_task_that_ends_its_process_ends_nothing_else() -> None:
-    def task(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
-        if figure.describe().person.stature < 1.70:
-            sys.exit("no room")
-        return standing(figure, target, layout)
-
-    found = wb.accommodation(task, {"low": {"sex": "male", "stature": 1.65}, "high": {"sex": "male", "stature": 1.75}})
-    assert [one.outcome for one in found.records] == ["ended", "solved"]
-    assert "no room" in found.records[0].message
-
-
-SITTING = {  # dimension, sex, share of ANSUR II's people at or below a value, metres
-    ("thigh_clearance", "male", 0.185): 0.65, ("thigh_clearance", "female", 0.185): 0.89,
-    ("hip_breadth_sitting", "male", 0.440): 0.97, ("hip_breadth_sitting", "female", 0.440): 0.90,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("sex", ["male", "female"])
-def test_shares_of_built_bodies_are_those_of_people(sex: str) -> None:
-    bodies = [measure(wb.load("human", **one)) for one in wb.people(25, sex).values()]
-    for (name, own, value), share in SITTING.items():
-        if own == sex:
-            assert np.mean([body[name] <= value for body in bodies]) == pytest.approx(share, abs=0.07), name
-
-
 def under_a_desk(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
     """Somebody who sits as people are measured, with a desk 185 mm over the seat."""
     scene = wb.Scene(figure).add(wb.Box((0.40, 0.6, 0.04)), name="seat", at=(0.2, 0.0, 0.58))
@@ -160,22 +133,6 @@ def test_who_sits_as_people_are_measured_fits_by_the_thighs() -> None:
     found = wb.accommodation(under_a_desk, people)
     fits = {one.factors["person"]: good for one, good in zip(found.records, found.fits, strict=True)}  # type: ignore[index]
     assert fits == {"183": True, "187": False}
-
-
-def between_armrests(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
-    scene = wb.Scene(figure).add(wb.Box((0.40, 0.6, 0.04)), name="seat", at=(0.2, 0.0, 0.58))
-    scene.add(wb.Box((0.03, 0.6, 0.6)), name="back", at=(-0.015, 0.0, 1.0))
-    for name, y in (("left rest", 0.22), ("right rest", -0.22)):  # 0.40 m apart
-        scene.add(wb.Box((0.3, 0.04, 0.18)), name=name, at=(0.2, y, 0.691))
-    return wb.Problem(scene, "sitting", constraints=[wb.Sit(on="seat", back="back", erect=True)])
-
-
-def test_who_sits_as_people_are_measured_fits_by_the_hips() -> None:
-    hips = (0.398, 0.402)
-    people = {f"{1e3 * one:g}": {"sex": "female", "proportions": {"hip_breadth_sitting": one}} for one in hips}
-    found = wb.accommodation(between_armrests, people)
-    fits = {one.factors["person"]: good for one, good in zip(found.records, found.fits, strict=True)}  # type: ignore[index]
-    assert fits == {"398": True, "402": False}
 
 
 def test_people_are_the_same_for_the_same_seed_and_load_as_drawn() -> None:

@@ -384,25 +384,6 @@ def test_goals_that_move_keep_the_plan_and_other_goals_renew_it(problem):
         assert_same(lineariser.at(q, 0.05), reference(asked, asked.workspace()).at(q, 0.05))
 
 
-def test_the_plan_of_a_problem_is_made_once_and_follows_what_is_set(problem, monkeypatch):
-    """Later solves make no plan; terms that were replaced are evaluated as they are now."""
-    scene, q = problem.scene, posture(problem, 5)
-    asked = wb.Problem(scene, goals=[wb.Point("left_palm", (0.4, 0.2, 1.0))], constraints=[wb.Hold("left_foot")])
-    other = wb.Problem(
-        scene, constraints=[wb.Hold("right_foot"), wb.Freeze("neck")], measures=[wb.tasks.Displacement(3.0)]
-    )
-    copies = [asked.with_start(q) for _ in range(3)]
-    copies[0].constraints, copies[1].bounds, copies[2].measures = other.constraints, other.bounds, other.measures
-    for each in (asked, *copies):
-        each.retarget([wb.Point("left_palm", (0.5, 0.1, 1.2))])
-        assert_same(each.lineariser(each.workspace()).at(q, 0.05), reference(each, each.workspace()).at(q, 0.05))
-    monkeypatch.setattr("wholebody.problem.make_plan", None)
-    for each in (asked, *copies):
-        each.lineariser(each.workspace()).at(q, 0.05)
-    with pytest.raises(TypeError):
-        wb.Problem(scene, goals=asked.goals).lineariser(asked.workspace())
-
-
 def test_joints_that_follow_others_and_round_joints(tmp_path):
     """Mimic joints, continuous joints and a floating base of a robot: the compiled pass is the plain one."""
     robot = tmp_path / "robot.urdf"

@@ -15,7 +15,7 @@ TOP = 0.74  # m: of the table
 
 @pytest.fixture(scope="module")
 def problem() -> wb.Problem:
-    scene = wb.Scene(wb.load("human"))
+    scene = wb.Scene(wb.load("avatar"))
     scene.add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.75, 0.0, TOP - 0.02))
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     return wb.Problem(scene, "standing", goals=[wb.Point("right_index_tip", (0.4, -0.25, 0.9))], constraints=holds)
@@ -86,7 +86,7 @@ def _lowered(problem: wb.Problem, q: np.ndarray, way: float) -> np.ndarray:  # t
 
 
 def test_a_frame_keeps_its_orientation() -> None:
-    scene = wb.Scene(wb.load("human"))
+    scene = wb.Scene(wb.load("avatar"))
     turn = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, 0.3))
     bent = {"hip_flexion": 0.2, "knee_flexion": 0.4, "ankle_dorsiflexion": 0.2}
     angles = {f"{side}_{joint}": angle for side in ("left", "right") for joint, angle in bent.items()}

@@ -17,12 +17,16 @@ from wholebody.tracking import live_subjects
 from wholebody.tracking.live import LiveDrag
 
 
+def standing(who: str) -> LiveDrag:
+    scene = wb.Scene(wb.load(who)).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.0, 0.75))
+    return LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
+
+
 @pytest.fixture
 def drag(monkeypatch: pytest.MonkeyPatch) -> LiveDrag:
     monkeypatch.setattr(live_subjects, "BUDGET", 1.0)  # so that no answer depends on the machine's speed
-    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.0, 0.75))
-    return LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
+    return standing("avatar")
 
 
 def along(drag: LiveDrag, name: str, way: Any, frames: int = 30) -> Any:
@@ -83,6 +87,7 @@ def test_a_thing_that_is_thrown_at_what_is_held_stays_before_it(drag: LiveDrag, 
         drag, thing, aim = LiveDrag(jointed()), "block", np.array((-0.4, 0.0, 0.5))
         assert drag.toggle("rod")
     else:
+        drag = standing("human")
         drag.choose(method)
         drag.toggle("pelvis")
         thing, aim = "table", drag.place("pelvis")

@@ -54,7 +54,7 @@ def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
 
 @pytest.mark.parametrize(
     ("kind", "speed", "turn"),
-    [("plate", 2.5, 3.0), ("ball", 2.5, 3.0)],
+    [("plate", 2.5, 3.0)],
 )
 def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
     """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
@@ -323,8 +323,8 @@ def test_a_frame_says_so_where_a_thing_was_put_into_the_figure(overlap: str) -> 
     scene = wb.Scene(wb.load("human")).add(wb.Box((0.02, 0.5, 0.5)), name="board", at=(2.0, 0.0, 1.2))
     q = scene.figure.posture("standing")
     loop, rng, inside, free = FrameLoop(scene, q, overlap=overlap), np.random.default_rng(0), 0, 0
-    for number in range(30):
-        if number % 5 == 0:
+    for number in range(16):
+        if number % 4 == 0:
             scene.move("board", at=rng.uniform((-0.15, -0.3, 0.9), (0.15, 0.3, 1.4)))
         frame = loop.frame(q)
         overlaps = scene.contacts(frame.q, within=-1.2e-4)

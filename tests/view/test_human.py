@@ -69,42 +69,31 @@ def test_a_body_that_is_small_in_the_picture_is_drawn_with_fewer_triangles(brows
     assert small < 3 * coarse  # the shadow is drawn coarsely in both
 
 
-def test_a_page_for_pictures_has_the_shaders_of_a_person_among_things(
+def test_a_page_for_pictures_has_the_shaders_of_a_person_and_light_from_behind_asks_for_no_shadows(
     browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """They are compiled before the scene comes."""
+    """Shaders are compiled before the scene comes.
+
+    Light from behind is no light: shadows are asked for in fewer places. The picture is the one where, as in three's
+    own shaders, they are asked for everywhere.
+    """
     monkeypatch.setattr(screenshot, "Browser", lambda **_: browser)
     programs = "viewer.renderer.info.programs.map(program => program.cacheKey)"
-    browser.open_html(picture_page())
-    there = set(browser.evaluate(programs))
-    figure = load("human")
-    scene = Scene(figure).add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
-    scene.add(Box((0.4, 0.4, 0.4)), name="crate", at=(0.6, 0.0, 0.2))
-    problem = Problem(scene, goals=[Point("right_index_tip", (0.4, -0.2, 1.2))])
-    viewer = Viewer(scene, screenshots=Screenshots())
-    viewer.show(figure.posture("standing"), problem=problem)
-    viewer.picture(tmp_path / "person.png", (320, 240))
-    assert set(browser.evaluate(programs)) <= there
-
-
-def test_a_picture_is_the_same_where_what_faces_away_from_the_sun_asks_for_shadows_too(
-    browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """Light from behind is no light: shadows are asked for in fewer places, as three's own shaders ask everywhere."""
     page = picture_page()
     everywhere = page.replace("directLight.direction ) > 0.0 ?", "directLight.direction ) > -2.0 ?")
     assert everywhere != page
     figure = load("human")
     scene = Scene(figure).add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
     scene.add(Box((0.4, 0.4, 0.4)), name="crate", at=(0.6, 0.0, 0.2))
-    monkeypatch.setattr(screenshot, "Browser", lambda **_: browser)
+    problem = Problem(scene, goals=[Point("right_index_tip", (0.4, -0.2, 1.2))])
     found = []
     for text, side in ((page, "> 0.0"), (everywhere, "> -2.0")):
         monkeypatch.setattr(screenshot, "picture_page", lambda text=text: text)
         browser.open_html(text)
+        there = set(browser.evaluate(programs))
         viewer = Viewer(scene, screenshots=Screenshots())
-        viewer.show(figure.posture("standing"))
-        picture = viewer.picture(tmp_path / "person.png", (320, 240))
-        found.append(np.asarray(Image.open(picture)))
+        viewer.show(figure.posture("standing"), problem=problem)
+        found.append(np.asarray(Image.open(viewer.picture(tmp_path / "person.png", (320, 240)))))
+        assert set(browser.evaluate(programs)) <= there
         assert browser.evaluate(f"MeshCat.THREE.ShaderChunk.lights_fragment_begin.includes('direction ) {side} ?')")
     assert np.array_equal(*found)

@@ -142,17 +142,12 @@ def test_mouse_drags_holds_undoes_and_saves(
     press(browser, "undo")
     until(lambda: np.array_equal(drag.q, start))
 
-    for arrow, shift, wanted in (
-        ("ArrowRight", False, (0.03 * 1.6 / np.hypot(1.6, 2.2), 0.03 * 2.2 / np.hypot(1.6, 2.2), 0.0)),
-        ("ArrowDown", True, (0.03 * 2.2 / np.hypot(1.6, 2.2), -0.03 * 1.6 / np.hypot(1.6, 2.2), 0.0)),
-    ):
-        before = drag.place("right_palm")  # chosen by the last click
-        for _ in range(3):
-            key(browser, arrow, shift)
-        there = before + wanted
-        until(partial(arrived, drag, there))
-        # presses that come late, from a busy browser, are drags of their own, each with an Escape
-        until(lambda: undone(browser, drag, start), pause=0.5)
+    before = drag.place("right_palm")  # chosen by the last click
+    for _ in range(3):
+        key(browser, "ArrowDown", shift=True)
+    there = before + (0.03 * 2.2 / np.hypot(1.6, 2.2), -0.03 * 1.6 / np.hypot(1.6, 2.2), 0.0)
+    until(partial(arrived, drag, there))
+    # presses that come late, from a busy browser, are drags of their own, each with an Escape
+    until(lambda: undone(browser, drag, start), pause=0.5)
     assert np.allclose(client.camera.position, EYE, atol=1e-3)  # arrow keys do not turn the camera
-    assert browser.evaluate("document.body.textContent.includes('arrow keys move the chosen handle')")
     assert not browser.errors

@@ -28,7 +28,7 @@ INSIDE = "document.querySelector('iframe').contentWindow"
 def page() -> str:
     """A person that lifts its arms, and an answer whose right elbow is bent by 0.1 rad more."""
     motion = person(12)
-    clip = wb.retarget(motion, wb.load("human"))
+    clip = wb.retarget(motion, wb.load("avatar"))
     q = np.array(clip.q)
     q[:, clip.figure.model.joints[clip.figure.joint_id("right_elbow_flexion")].idx_q] += 0.1
     return motion_curves(motion, {"retargeted": clip, "freed": clip.with_q(q)}, wb.Scene(clip.figure))
@@ -53,7 +53,7 @@ def test_the_lines_are_those_of_the_motions(page: str) -> None:
     assert max(value for value in feet["feet", "retargeted"] if value is not None) < 5.0
     loads = [lines(page, title) for title in ("torque", "force", "zero moment point")]
     assert [{of for _, of in each} for each in loads] == [{"retargeted", "freed"}] * 3
-    weight = 9.81 * pin.computeTotalMass(wb.load("human").model)
+    weight = 9.81 * pin.computeTotalMass(wb.load("avatar").model)
     borne = sum(np.array(values) for (_, of), values in loads[1].items() if of == "retargeted")
     assert np.median(borne) == pytest.approx(weight, rel=0.1)  # it stands, and lifts its arms slowly
     assert "http://" not in re.sub(r"http://www\.w3\.org/\S*", "", page.split("srcdoc=")[0])
@@ -90,7 +90,7 @@ def test_curves_of_long_recordings_are_drawn(browser: Any, page: str, tmp_path: 
 
 def test_motions_of_other_lengths_are_refused() -> None:
     motion = person(4)
-    clip = wb.retarget(motion, wb.load("human"), ground=None)
+    clip = wb.retarget(motion, wb.load("avatar"), ground=None)
     with pytest.raises(InputError, match="retargeted 3, the recording 4"):
         motion_curves(motion, {"retargeted": clip[:3]}, wb.Scene(clip.figure))
 
@@ -131,7 +131,7 @@ def test_arms_on_fixed_bases_stand_beside_each_other_in_their_postures(monkeypat
 
 
 def test_things_that_cannot_be_drawn_are_refused() -> None:
-    figure = wb.load("human")
+    figure = wb.load("avatar")
     moving = {"box": np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], (2, 1))}
     clip = wb.Clip(figure, np.tile(figure.posture("standing"), (2, 1)), 0.1, "carries", moving)
     with pytest.raises(wb.InputError, match="need to differ"):

@@ -11,13 +11,6 @@ from wholebody.bench.measure.track import SETTING, VARIANTS, Track, smooth_way, 
 from wholebody.bench.suite.problem_sets.case import numbers
 
 
-def test_there_are_twenty_objects_and_at_least_700_pairs(short_free: Track) -> None:
-    kinds = [name.split()[0] for name in short_free.scene.objects]
-    assert len(kinds) == 20
-    assert (kinds.count("sphere"), kinds.count("hull")) == (6, 7)
-    assert short_free.pairs >= 700
-
-
 def test_the_same_reach_is_made_at_every_call(short_free: Track) -> None:
     again = track("free", 8)
     assert (again.targets == short_free.targets).all()

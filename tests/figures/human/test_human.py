@@ -334,27 +334,6 @@ def test_every_pair_is_tested_or_excluded_with_a_reason(detail):
     assert all(entry.reason for entry in figure.excluded_pairs)
 
 
-def test_limits_are_the_tables():
-    figure = person()
-    rows = {row["name"]: row for row in table("joints")}
-    for idx, low, high in zip(figure.limits.idx_v, figure.limits.lower, figure.limits.upper, strict=True):
-        name = next(name for name in figure.joints if figure.dofs([name])[0] == idx)
-        assert math.degrees(low) == pytest.approx(float(rows[name]["lower_deg"]), abs=1e-8)
-        if name.endswith("clavicle_elevation"):  # follows from overhead reach; the table has the mean of texts
-            assert math.degrees(high) == pytest.approx(float(rows[name]["upper_deg"]), abs=5.0)
-        else:
-            assert math.degrees(high) == pytest.approx(float(rows[name]["upper_deg"]), abs=1e-8)
-    assert len(figure.limits.lower) == 49
-
-
-def test_effort_weights_are_the_tables_and_the_root_costs_too():
-    figure = person()
-    assert figure.effort_weights[:6].tolist() == [5.0, 5.0, 5.0, 2.0, 2.0, 2.0]
-    assert figure.effort_weights[figure.dofs(["left_clavicle_elevation"])] == pytest.approx(20.0)
-    assert figure.effort_weights[figure.dofs(["right_elbow_flexion"])] == pytest.approx(1.0)
-    assert not load("avatar").effort_weights[:6].any()
-
-
 @pytest.mark.parametrize(("angle", "mean"), [("flexion", 20.0), ("lateral", 105.0), ("rotation", 10.0)])
 def test_levels_of_the_spine_share_a_motion_as_their_ranges_do(angle: str, mean: float):
     figure = person()

@@ -247,8 +247,10 @@ def test_spheres_cover_the_pieces_as_far_as_the_page_says(case):
     assert max(out) < 0.035
 
 
-@pytest.mark.parametrize("detail", ["capsules", "hulls", "spheres"])
-@pytest.mark.parametrize("who", [{"sex": "female"}, {"sex": "male"}, {"stature": 1.65, "mass": 110.0}])
+@pytest.mark.parametrize(
+    ("detail", "who"),
+    [("capsules", {"sex": "female"}), ("hulls", {"stature": 1.65, "mass": 110.0}), ("spheres", {"sex": "male"})],
+)
 def test_named_postures_of_who_is_dressed_are_free(who, detail):
     scene = wb.Scene(load("human", clothing=0.03, detail=detail, **who))
     for name in scene.figure.postures:

@@ -22,7 +22,6 @@ from wholebody.geometry.mesh_cache import VARIABLE, cache_state
 FINE_SURFACES = True
 
 PEOPLE: dict[str, dict[str, Any]] = {
-    "small woman": {"sex": "female", "stature": 1.525, "mass": 51.3},
     "heavy man": {"sex": "male", "stature": 1.87, "mass": 125.0},
 }
 
@@ -162,7 +161,7 @@ def volume(corners: Any) -> float:
 
 
 def test_the_patches_cover_every_part_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    figure, bones, parts = parts_of("small woman")
+    figure, bones, parts = parts_of("heavy man")
     monkeypatch.setattr(making, "person_parts", lambda person: (dict(enumerate(bones)), parts))
     patches = making.person_surface(figure.describe().person).patches
     assert len({patch.name for patch in patches}) == len(patches)

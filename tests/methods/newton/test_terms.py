@@ -80,11 +80,8 @@ def test_the_objective_has_the_measures_gradient(human: wb.Figure) -> None:
 
 
 CASES: dict[str, tuple[list[Any], list[Any], list[Any] | None]] = {
-    "center of mass": ([wb.CenterOfMass((0.03, 0.02, 0.85))], [], None),
     "balance": ([wb.Point("right_index_tip", (0.75, -0.2, 0.7))], [wb.Balance(margin=0.02)], None),
     "cones": ([wb.Point("right_index_tip", (-0.2, -0.4, 1.2))], [wb.tasks.ReachCones()], None),
-    "gaze": ([wb.Axis("head", (1, 0, 0), toward=(0.5, 0.8, 0.8))], [], None),
-    "posture": ([wb.Posture("arms_forward", joints=["left_arm"])], [], None),
     "discomfort": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.Effort(), wb.tasks.Discomfort(0.5)]),
 }
 

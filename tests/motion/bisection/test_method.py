@@ -37,11 +37,16 @@ SPREAD = 0.2  # rad: with less, swinging arms are in the trunk
 
 @pytest.fixture(scope="module")
 def person() -> Figure:
-    return wb.load("human")
+    """Return an avatar, which is a person with fewer joints."""
+    return wb.load("avatar")
 
 
 @pytest.fixture(scope="module")
 def swing(person: Figure) -> Clip:
+    return swinging(person)
+
+
+def swinging(person: Figure) -> Clip:
     """Arms swing as in a walk, a period of 40 frames."""
     phase = 2.0 * np.pi * np.arange(41) / 40.0
     q = [
@@ -162,9 +167,9 @@ def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figu
         np.testing.assert_allclose(state.frame(person.frame_id(foot.frame)).translation, held, atol=2e-4)
 
 
-def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(swing: Clip) -> None:
+def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(human: Figure) -> None:
     """Self-collision of the thesis: 39 spheres, and a pouch filled with spheres."""
-    figure = wb.load("human", detail="spheres")
+    swing, figure = swinging(human), wb.load("human", detail="spheres")
     clip, scene = Clip(figure, swing.q, swing.dt), wb.Scene(figure)
     for piece in equipment("pouches", figure):
         piece.filled(8, envelope=True).attach(scene)
@@ -173,7 +178,8 @@ def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(swing: Clip) -> N
     assert depths(scene, result.q).max() <= DEEP
 
 
-def test_frozen_joints_are_the_original_ones_in_every_frame(swing: Clip) -> None:
+def test_frozen_joints_are_the_original_ones_in_every_frame(human: Figure) -> None:
+    swing = swinging(human)
     scene, swing = dressed(swing.figure, "side_sphere"), swing[:15]
     result = freed_by(Bisection(frozen=("root", "lower_body", "spine")), swing, scene)
     columns = [
@@ -204,11 +210,11 @@ def test_a_constraint_freezes_as_the_setting_does(swing: Clip) -> None:
     assert len(changed(swing, result))
 
 
-def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Figure) -> None:
+def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(human: Figure) -> None:
     """Both hands hold one weapon; elbows swing into a ball at the side of the torso."""
-    scene = dressed(person, "side_sphere")
+    scene = dressed(human, "side_sphere")
     held = wb.Problem(
-        wb.Scene(person),
+        wb.Scene(human),
         goals=[wb.Point("right_palm", (0.25, -0.12, 1.1)), wb.Point("left_palm", (0.42, 0.06, 1.12))],
         constraints=[wb.Freeze("root", "lower_body", "spine")],
     )
@@ -217,7 +223,7 @@ def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Fi
     q = [
         wb.solve(
             wb.Problem(
-                wb.Scene(person),
+                wb.Scene(human),
                 base,
                 goals=[
                     wb.Point("right_palm", (0.22 + way, -0.14, 1.08)),
@@ -228,17 +234,17 @@ def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Fi
         ).q
         for way in ways.tolist()
     ]
-    clip = Clip(person, np.array(q), 1 / 30)
+    clip = Clip(human, np.array(q), 1 / 30)
     assert (depths(scene, clip.q) > DEEP).any()
     grip = wb.Hold("left_palm", relative_to="right_palm", orientation=False)
     result = freed_by(Bisection(), clip, scene, [grip])
     assert depths(scene, result.q).max() <= DEEP
-    state = State(person.model)
+    state = State(human.model)
     for before, after in zip(clip.q, result.q, strict=True):
         places = []
         for posture in (before, after):
             state.update(posture)
-            left, right = (state.frame(person.frame_id(f"{side}_palm")).copy() for side in ("left", "right"))
+            left, right = (state.frame(human.frame_id(f"{side}_palm")).copy() for side in ("left", "right"))
             places.append((right.inverse() * left).translation)
         assert np.linalg.norm(places[0] - places[1]) < 1e-3
 

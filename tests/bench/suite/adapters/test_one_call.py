@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import weakref
 from typing import Any
 
 import numpy as np
@@ -57,26 +55,6 @@ def test_what_it_made_is_used_again_until_what_it_was_made_from_changes() -> Non
     tool.solve(moved)
     tool.solve(moved)
     assert len(tool.models) == 3
-
-
-class Bare(Still):
-    """Keeps nothing of a problem by itself."""
-
-    def build(self, problem: wb.Problem) -> Any:
-        return None
-
-    def found(self, built: Any, problem: wb.Problem) -> tuple[Any, bool]:
-        return problem.start, True
-
-
-def test_what_it_was_made_from_lives_while_it_is_compared_with() -> None:
-    """Else a new model at the address of a forgotten one would be taken for it."""
-    tool, problem = Bare(1e-3), _problem()
-    model = weakref.ref(problem.scene.model)
-    tool.solve(problem)
-    del problem
-    gc.collect()
-    assert model() is not None
 
 
 def test_an_answer_that_is_missing_is_the_start_with_its_reason() -> None:

@@ -19,7 +19,7 @@ from wholebody.bench.suite.problem_sets.case import ProblemSet
 from wholebody.methods.base import SolvingTracker
 from wholebody.methods.control import Progress
 
-COMPILING = 0.8  # s: that the first solve of the method that compiles takes longer
+COMPILING = 0.5  # s: that the first solve of the method that compiles takes longer
 ARM = Path(__file__).parents[3] / "data" / "arm" / "arm.urdf"
 
 

@@ -49,15 +49,6 @@ def test_only_what_is_beyond_both_intervals_differs() -> None:
     assert shares(slower) == []
 
 
-def test_what_differs_is_said() -> None:
-    found = replace(changed(("robot_arm", "dls", "solved"), Interval(0.7, 0.65, 0.75)), facts={"wholebody": "0.2"})
-    assert in_words(PUBLISHED, found) == [
-        "3 figures compared; 1 differ by more than their intervals.",
-        "robot arm, dls, solved: 50.0 % [40, 60] published, 70.0 % [65, 75] now.",
-        "Other than published: wholebody 0.1, now 0.2.",
-    ]
-
-
 def test_other_files_and_unknown_methods_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "lock.json"
     path.write_text("{}")

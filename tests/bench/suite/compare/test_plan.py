@@ -38,13 +38,6 @@ def test_what_a_fast_method_leaves_over_goes_to_a_slow_one() -> None:
     assert sweeps[1] == 5  # half of the share
 
 
-def test_a_slower_method_never_gets_more() -> None:
-    one, sweep = np.array([0.1, 0.2, 0.4, 0.8]), np.array([1.0, 2.0, 4.0, 8.0])
-    cases, sweeps = share_out(one, sweep, np.full(4, 200.0), np.full(4, 40.0), 60.0)
-    assert (np.diff(cases) <= 0).all()
-    assert (np.diff(sweeps) <= 0).all()
-
-
 def test_costs_that_are_not_known_yet_bound_nothing() -> None:
     cases, sweeps = share_out(np.zeros(2), np.zeros(2), np.full(2, 20.0), np.full(2, 6.0), 1.0)
     assert (cases == 20).all()

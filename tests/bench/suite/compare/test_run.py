@@ -107,7 +107,7 @@ def test_goals_that_move_are_followed_frame_by_frame(fakes: ModuleType, tmp_path
 def run_slowly(asked: Settings, folder: Path) -> None:
     """Run in a group of processes of its own, slowly, or it may be over before it is killed."""
     os.setsid()
-    os.environ["FAKES_SLEEP"] = "0.3"
+    os.environ["FAKES_SLEEP"] = "0.15"
     run(asked, folder)
 
 

@@ -33,11 +33,3 @@ def test_the_goals_move_far_smoothly_and_at_a_speed_of_people() -> None:
     assert jump.max() < 40.0  # m/s^2: no frame kinks
     assert np.linalg.norm(speed[0]) < 0.01
     assert np.linalg.norm(speed[-1]) < 0.01
-
-
-def test_the_spline_has_no_corners() -> None:
-    """Value, first and second differences go on from one span to the next."""
-    control = np.random.default_rng(0).normal(size=(6, 2))
-    whole = np.vstack([reaching._span(control[k : k + 4]) for k in range(3)])
-    third = np.abs(np.diff(whole, 3, axis=0)).max() * reaching.of_drag.frames_a_span**3
-    assert third < 3.0 * np.abs(np.diff(control, 3, axis=0)).max()

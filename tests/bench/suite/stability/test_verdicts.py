@@ -121,7 +121,7 @@ def sleeps(problem: Problem) -> np.ndarray:
 
 
 def waits(problem: Problem) -> np.ndarray:
-    time.sleep(0.8)
+    time.sleep(0.5)
     return start(problem)
 
 
@@ -152,7 +152,7 @@ def test_hanging(fake: Fakes) -> None:
 
 def test_waiting_is_no_hanging(fake: Fakes) -> None:
     """Others' work on the machine, which makes a method wait, ends no answer: its limit is of the processor."""
-    assert verdict_of_process("conflict", fake(waits), cap=0.5).kind == "honest"
+    assert verdict_of_process("conflict", fake(waits), cap=0.3).kind == "honest"
 
 
 def test_crashing(fake: Fakes) -> None:
