@@ -70,7 +70,10 @@ def _unpacked(data: bytes) -> Surface:
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         told = json.loads(arrays["told"].tobytes())
         placed = zip(told["bones"], arrays["bind"], arrays["rest"], strict=True)
-        bones = tuple(Bone(*names, bind, rest, tuple(slide)) for (*names, slide), bind, rest in placed)
+        bones = tuple(
+            Bone(name, parent, instead, bind, rest, (x, y, z))
+            for (name, parent, instead, (x, y, z)), bind, rest in placed
+        )
         ends = np.cumsum(arrays["sizes"], axis=0)[:-1].T
         ends = dict(zip(_STORED, ends[[0, 0, 0, 0, 1, 2]], strict=True))
         parts = [np.split(arrays[name], ends[name]) for name in _STORED]
