@@ -57,6 +57,7 @@ def test_who_sits_is_as_broad_as_people_are_on_a_seat(who: str) -> None:
     assert found["hip_breadth_sitting"] == pytest.approx(0.0, abs=12.0)
     assert 0.0 < found["under the seat"] < 20.0
     assert found["popliteal_height"] == pytest.approx(0.0, abs=5.0)
+    assert found["buttock_popliteal_length"] == pytest.approx(0.0, abs=12.0)
 
 
 def test_a_half_bone_slides_by_the_cosine() -> None:

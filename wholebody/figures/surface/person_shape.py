@@ -114,6 +114,7 @@ class PersonShape:
         start, top = (0.95 * first, -0.015) if part == "thigh" else (first, 0.0)
         if part == "shank":
             start = caps(self.solids, f"{side}_thigh")[-1][1]
+            del balls[0]  # the bone below the knee, around which there is flesh
         # Around the elbow the joint is nearer to the skin than to the middle of the arm: the pieces end there.
         before = [] if part == "forearm" else [(np.array([0.0, 0.0, top]), start)]
         after = [] if part == "upper_arm" else [(end[:3], last)]
