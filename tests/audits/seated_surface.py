@@ -44,7 +44,7 @@ def drawn(figure: wb.Figure, data: pin.Data) -> Points:
         data.oMi[figure.model.getJointId(name)].homogeneous @ at for name, at in surface.attached(figure, np.eye(4))
     ]
     for number, first, second in surface.halves:
-        bones[number] = halfway(bones[first], bones[second])
+        bones[number] = halfway(bones[first], bones[second], surface.bones[number].slide)
     moves = np.array([now @ np.linalg.inv(bone.bind) for now, bone in zip(bones, surface.bones, strict=True)])
     for patch in surface.patches:
         points = np.column_stack((patch.vertices, np.ones(len(patch.vertices))))

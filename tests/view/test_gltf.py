@@ -61,7 +61,7 @@ def bent(figure: wb.Figure, q: np.ndarray) -> np.ndarray:
         placed.append(data.oMi[figure.model.getJointId(joint)].homogeneous @ offset)
         if bone.parent is not None:
             first = placed[[other.segment for other in surface.bones].index(bone.parent)]
-            placed[-1] = halfway(first, placed[-1])
+            placed[-1] = halfway(first, placed[-1], bone.slide)
     moved = [at @ np.linalg.inv(bone.bind) for at, bone in zip(placed, surface.bones, strict=True)]
     found = {}
     for patch in surface.patches:

@@ -39,12 +39,13 @@ def label(path: str, text: str, color: str, size: float) -> Command:
 
 
 def set_skeleton(
-    path: str, carriers: Sequence[str], offsets: Array, inverses: Array, halves: Sequence[tuple[int, int, int]]
+    path: str, carriers: Sequence[str], offsets: Array, inverses: Array, halves: Sequence[Sequence[float]]
 ) -> Command:
     """Put a skeleton at a node: bones that follow other nodes, and bend the skins that name it.
 
     Each of n bones has its carrier, `offsets` (n, 4, 4) from it, and `inverses` (n, 4, 4) where the skin was bound;
-    `halves` turn half way between two others: index of the bone, of the first and of the second, its origin.
+    `halves` turn half way between two others: index of the bone, of the first and of the second, its origin, and its
+    slide (3,), as `Bone` has it.
     """
     message = {
         "type": "skeleton",

@@ -138,13 +138,17 @@
     const made = new THREE.Skeleton(nodes.map(() => new THREE.Bone()), matrices(cmd.inverses));
     const first = new THREE.Quaternion(), second = new THREE.Quaternion();
     const at = new THREE.Vector3(), size = new THREE.Vector3(), nowhere = new THREE.Vector3();
+    const up = new THREE.Vector3(), other = new THREE.Vector3();
     const update = made.update.bind(made);
     made.update = function () {
       nodes.forEach((node, k) => made.bones[k].matrixWorld.multiplyMatrices(node.matrixWorld, offsets[k]));
-      for (const [half, from, to] of cmd.halves) {
+      for (const [half, from, to, ...slide] of cmd.halves) {
         made.bones[from].matrixWorld.decompose(nowhere, first, size);
         made.bones[to].matrixWorld.decompose(at, second, size);
-        made.bones[half].matrixWorld.compose(at, first.slerp(second, 0.5), size);
+        const bent = 1 - up.set(0, 0, 1).applyQuaternion(first).dot(other.set(0, 0, 1).applyQuaternion(second));
+        first.slerp(second, 0.5);
+        at.add(up.fromArray(slide).multiply(size).multiplyScalar(bent).applyQuaternion(first));
+        made.bones[half].matrixWorld.compose(at, first, size);
       }
       update();
     };

@@ -47,7 +47,7 @@ class Skin:
                 [carriers[joint] for joint, _ in self.places],
                 np.array([offset for _, offset in self.places]),
                 np.linalg.inv(np.array([bone.bind for bone in bones])),
-                self.surface.halves,
+                [(*half, *bones[half[0]].slide) for half in self.surface.halves],
             )
         )
         drawn = []

@@ -51,7 +51,7 @@ def bent(figure: Any, bones: Sequence[Bone], parts: Iterable[tuple[Any, Any]], q
         else:
             place = data.oMf[figure.frame_id(bone.instead)].homogeneous @ bone.rest
         if bone.parent is not None:
-            place = making.halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place)
+            place = making.halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place, bone.slide)
         moved.append(place @ np.linalg.inv(bone.bind))
     found = []
     for vertices, weights in parts:

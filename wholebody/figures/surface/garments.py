@@ -22,6 +22,8 @@ class Bone(NamedTuple):
     instead: str | None
     bind: Array  # (4, 4) placement in the world in the binding posture
     rest: Array  # (4, 4) placement relative to `instead` in such a figure
+    # of a half, metres along its own axes by which it slides where `segment` is at a right angle to `parent`
+    slide: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Patch(NamedTuple):

@@ -47,7 +47,9 @@ def hand_shape(person: Person, side: str) -> HandShape:
         fingers.append(union(bones))
     wrist = person.radius("wrist")
     above = 0.05  # m: of forearm that the surface has above the wrist; a sleeve covers it
-    stump = union([round_cone((x, 0.0, above), (x, 0.0, -0.004), 0.68 * wrist, 0.72 * wrist) for x in (-0.008, 0.008)])
+    stump = union(
+        [round_cone((x, 0.0, above), (x, 0.0, -0.004), 0.56 * wrist, 0.72 * wrist) for x in (-0.3 * wrist, 0.3 * wrist)]
+    )
     claims.append(Claim(f"{side}_forearm", lambda points: np.maximum(-points[:, 2], 0.0), 0.006))
     thenar = _thenar(size, sign, bind[f"{side}_thumb_proximal"])
     solid = union([union([union(fingers, 0.002), palm], 0.007), thenar], 0.010)

@@ -42,8 +42,9 @@ def person_parts(person: Person) -> tuple[dict[str, Bone], list[Part]]:
     for side in ("left", "right"):
         for part, parent in HALVES.items():
             segment, other = f"{side}_{part}", parent if parent == "pelvis" else f"{side}_{parent}"
-            bind = halfway(shape.bind[other], shape.bind[segment])
-            bones[segment + "/half"] = Bone(segment, other, None, bind, np.eye(4))
+            slide = shape.slide(side, part)
+            bind = halfway(shape.bind[other], shape.bind[segment], slide)
+            bones[segment + "/half"] = Bone(segment, other, None, bind, np.eye(4), slide)
         hand, frame = hand_shape(person, side), shape.bind[f"{side}_hand"]
         for finger, parts in FINGERS.items():
             for part in parts:
@@ -62,11 +63,15 @@ def hand_surface(person: Person, side: str) -> Surface:
     return _divided(bones, [_made(garment, bones)])
 
 
-def halfway(first: Array, second: Array) -> Array:
-    """The placement (4, 4) at the second's origin whose rotation is half way from the first's to the second's."""
+def halfway(first: Array, second: Array, slide: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
+    """The placement (4, 4) of a half bone, whose rotation is half way from the first's to the second's.
+
+    It is at the second's origin but for its `slide` (3,) times 1 - cosine of the angle between the two z axes.
+    """
     turn = pin.log3(first[:3, :3].T @ second[:3, :3])
     found = np.array(second)
     found[:3, :3] = first[:3, :3] @ pin.exp3(0.5 * turn)
+    found[:3, 3] += (1.0 - first[:3, 2] @ second[:3, 2]) * (found[:3, :3] @ np.asarray(slide))
     return found
 
 

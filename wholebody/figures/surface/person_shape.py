@@ -106,12 +106,15 @@ class PersonShape:
         balls = caps(self.solids, segment)
         if part == "clavicle":
             return placed(limb(balls), self.bind[segment])
+        if part == "thigh":  # it tapers evenly from the hip's piece to the knee: where the knee's begins, it is deeper
+            balls[-2] = np.array([balls[-2][0][0], 0.0, -0.78 * self.person.length(segment)]), balls[-2][1]
         child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
         end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
         (_, first), (_, last) = balls[0], balls[-1]
         start, top = (0.95 * first, -0.015) if part == "thigh" else (first, 0.0)
         if part == "shank":
             start = caps(self.solids, f"{side}_thigh")[-1][1]
+            del balls[0]  # the bone below the knee, around which there is flesh
         # Around the elbow the joint is nearer to the skin than to the middle of the arm: the pieces end there.
         before = [] if part == "forearm" else [(np.array([0.0, 0.0, top]), start)]
         after = [] if part == "upper_arm" else [(end[:3], last)]
@@ -133,11 +136,13 @@ class PersonShape:
                 found.append(Claim(segment, self._trapezius(side)))
             if part == "thigh":
                 found.append(Claim("pelvis", self._buttock(dict(SIDES)[side])))
+                found.append(Claim(f"{segment}/half", self._spread(dict(SIDES)[side])))
             if part == "upper_arm":  # a raised arm pulls the flank along
                 found.append(Claim(f"{segment}/half", grown(self._armpit(side)[1], -0.006), 0.022))
             if part in HALVES:
-                radius = {"upper_arm": 0.035, "forearm": 0.020, "hand": 0.026, "thigh": 0.060, "shank": 0.030}[part]
-                reach = radius * self.size.stature / 1.75
+                thigh = 0.335 * self.person.size("thigh_clearance") / self._scale
+                radius = {"upper_arm": 0.035, "forearm": 0.020, "hand": 0.026, "thigh": thigh, "shank": 0.030}[part]
+                reach = radius * self._scale
                 found.append(Claim(f"{segment}/half", grown(ball(self.at(segment), reach), 0.006)))
         return found
 
@@ -150,7 +155,7 @@ class PersonShape:
         for side, sign in SIDES:
             solids += [
                 self._limbs[f"{side}_clavicle"],
-                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"]], 0.004),
+                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"], self._elbow(side)], 0.004),
                 self._trapezius(side),
                 *self._armpit(side),
             ]
@@ -176,6 +181,12 @@ class PersonShape:
         claims = self._claims([name for name in segments if name != "neck"])
         return Garment("shirt", COLORS.shirt, body, low, high, 0.020, claims, cuts)
 
+    def _elbow(self, side: str) -> Field:
+        """What fills the groove between the ends of upper arm and forearm."""
+        upper, fore = f"{side}_upper_arm", f"{side}_forearm"
+        (above, first), (below, last) = caps(self.solids, upper)[-1], caps(self.solids, fore)[0]
+        return round_cone(self.at(upper, above), self.at(fore, below), first, last)
+
     def _trapezius(self, side: str) -> Field:
         """The slope from the side of the neck to the end of the shoulder."""
         scale, sign = self._scale, dict(SIDES)[side]
@@ -197,12 +208,13 @@ class PersonShape:
 
     def _trousers(self) -> Garment:
         scale = self._scale
-        solids = [self._trunk]
+        halves = []
         for side, sign in SIDES:
-            legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
-            solids.append(union([union(legs[:2], 0.004), legs[2]], 0.03))
-            solids.append(self._buttock(sign))
-        body = _tapered(grown(union(solids, 0.04 * scale), CLOTH), self._belt() - 0.036 * scale)
+            leg = union([self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"]], 0.004)
+            leg = union([leg, self._hamstrings(side)], 0.012)
+            halves.append(union([leg, self._calf(side, sign), self._buttock(sign)], 0.03))
+        body = union([self._trunk, union(halves, 0.012)], 0.04 * scale)
+        body = _tapered(grown(body, CLOTH), self._belt() - 0.036 * scale)
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
@@ -216,10 +228,33 @@ class PersonShape:
         return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _buttock(self, sign: float) -> Field:
-        scale, height = self._scale, float(self.bind["pelvis"][2, 3])
-        back, low = self._trunk_ends(height - 0.01 * scale)[0], height - self.person.size("seat")
-        middle = (back + 0.080 * scale, sign * 0.072 * scale, low + 0.090 * scale)
-        return ellipsoid(middle, np.array([0.080, 0.078, 0.078]) * scale)
+        person, height = self.person, float(self.bind["pelvis"][2, 3])
+        back = self._trunk_ends(height - 0.01 * self._scale)[0]
+        deep, wide, high = 0.33 * person.size("buttock_depth"), 0.5 * person.size("hip_breadth"), 0.078 * self._scale
+        middle = (back + deep, 0.42 * sign * wide, height - person.size("seat") + high)
+        return ellipsoid(middle, (deep, 0.45 * wide, high))
+
+    def _hamstrings(self, side: str) -> Field:
+        """Muscles of the thigh behind its piece, which is as deep as a thigh on a seat."""
+        length, knee = self.person.length("left_thigh"), self.person.size("knee")
+        middle, high = caps(self.solids, f"{side}_thigh")[1]
+        upper = np.array([-0.08 * high, middle[1], -0.17 * length])  # ends as far behind the hip as the piece's radius
+        cone = round_cone(upper, (0.0, 0.0, -0.78 * length), 0.92 * high, 0.95 * knee)
+        return placed(cone, self.bind[f"{side}_thigh"])
+
+    def _spread(self, sign: float) -> Field:
+        """Where buttocks and thigh spread on a seat."""
+        wide, deep = (0.5 * self.person.size(name) for name in ("hip_breadth", "buttock_depth"))
+        seat = self.person.size("seat")
+        middle = self.at("pelvis", (-0.3 * deep, 0.55 * sign * wide, -0.9 * seat))
+        return grown(ellipsoid(middle, (0.75 * deep, 0.5 * wide, seat)), 0.012)
+
+    def slide(self, side: str, part: str) -> tuple[float, float, float]:
+        """How far (3,) the half bone of a segment slides: flesh on a seat, aside and up from where it would turn to."""
+        if part != "thigh":
+            return 0.0, 0.0, 0.0
+        more, seat = self.person.size("hip_breadth_sitting") - self.person.size("hip_breadth"), self.person.size("seat")
+        return 0.75 * seat, 0.7 * dict(SIDES)[side] * more, 1.1 * seat
 
     def _calf(self, side: str, sign: float) -> Field:
         length, radius = self.person.length("left_shank"), self.person.radius("calf")

@@ -39,7 +39,7 @@ def _kept(person: Person, hand: str) -> Surface:
         return hand_surface(person, hand) if hand else person_surface(person)
 
     # The number is another one whenever a shape, a weight or the layout changes.
-    digest = hashlib.sha256(f"20 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
+    digest = hashlib.sha256(f"22 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
     return cached_entry(digest.hexdigest(), make, _packed, _unpacked)
 
 
@@ -50,7 +50,7 @@ _STORED = {"vertices": "f4", "normals": "f4", "bones": "u1", "weights": "f4", "f
 def _packed(surface: Surface) -> bytes:
     patches = surface.patches
     told = {
-        "bones": [[bone.segment, bone.parent, bone.instead] for bone in surface.bones],
+        "bones": [[bone.segment, bone.parent, bone.instead, bone.slide] for bone in surface.bones],
         "patches": [[patch.name, patch.segment, patch.color] for patch in patches],
     }
     joined = {name: np.concatenate([getattr(patch, name) for patch in patches]) for name in _STORED}
@@ -70,7 +70,10 @@ def _unpacked(data: bytes) -> Surface:
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         told = json.loads(arrays["told"].tobytes())
         placed = zip(told["bones"], arrays["bind"], arrays["rest"], strict=True)
-        bones = tuple(Bone(name, parent, instead, bind, rest) for (name, parent, instead), bind, rest in placed)
+        bones = tuple(
+            Bone(name, parent, instead, bind, rest, (x, y, z))
+            for (name, parent, instead, (x, y, z)), bind, rest in placed
+        )
         ends = np.cumsum(arrays["sizes"], axis=0)[:-1].T
         ends = dict(zip(_STORED, ends[[0, 0, 0, 0, 1, 2]], strict=True))
         parts = [np.split(arrays[name], ends[name]) for name in _STORED]

@@ -118,7 +118,7 @@ class JointTree:
             called = f"{prefix}{bone.segment}"
             if number in whole:
                 first, second = whole[number]
-                keys = self._between(held[first], held[second])
+                keys = self._between(held[first], held[second], bone.slide)
                 node = self.builder.moving_node(f"{called} half", bones[first], keys, self._times)
             else:
                 node = self.builder.node(called, self._nodes[joint], offset)
@@ -160,15 +160,18 @@ class JointTree:
             found.append(known.get(joint, above @ self._first[joint]))
         return found
 
-    def _between(self, first: tuple[int, Array], second: tuple[int, Array]) -> tuple[Array, Array]:
-        """Half of the turn of a second part in a first, and its place there, of joints and placements in them."""
+    def _between(
+        self, first: tuple[int, Array], second: tuple[int, Array], slide: Sequence[float]
+    ) -> tuple[Array, Array]:
+        """Rotations and places of a half bone in the first of its two, of joints and placements in them."""
         data, found = self._model.createData(), np.empty((len(self._q), 4, 4))
         for k, posture in enumerate(self._q):
             pin.forwardKinematics(self._model, data, posture)
             ends = [data.oMi[joint].homogeneous @ offset for joint, offset in (first, second)]
             found[k] = np.linalg.solve(*ends)
-        half = Rotation.from_rotvec(0.5 * Rotation.from_matrix(found[:, :3, :3]).as_rotvec()).as_quat()
-        return steady(half), found[:, :3, 3]
+        half = Rotation.from_rotvec(0.5 * Rotation.from_matrix(found[:, :3, :3]).as_rotvec())
+        bent = 1.0 - found[:, 2, 2]
+        return steady(half.as_quat()), found[:, :3, 3] + bent[:, None] * half.apply(slide)
 
 
 def keys_of(model: Any, q: Array) -> tuple[Array, Array]:
