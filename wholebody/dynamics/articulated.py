@@ -36,6 +36,7 @@ from wholebody.scene.scene import Scene
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 FASTEST = 0.5  # m/s, at most
+COARSE = 1e-3  # m/s: programs that sweeps leave further from their laws are refined
 
 
 class Articulated:
@@ -143,18 +144,15 @@ class Articulated:
             self.velocity = np.linalg.solve(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
-        unborne, sprung = self.velocity, self.stiffness > 0.0
         bearing = self._bear(driven, points, time)
-        impulse, after = blow + bearing, self.velocity
-        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
+        impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
+        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, pressed)
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        ways = start + begin, np.where(sprung, after, unborne) + after
-        first, last = (points.figure @ (0.5 * both) for both in ways)
+        # springs and contacts are implicit; what is free of them moves by the mean of both velocities
+        moves = time * np.where((self.stiffness > 0.0) | pressed, after, mean)
+        first, last = points.figure @ (0.5 * (start + begin)), points.figure @ after
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
-        # springs and contacts are implicit; what is free of them moves by the mean of both velocities, and limp
-        # freedoms are paid for the fall that contacts prevent
-        moves = time * np.where(sprung | bearing.any(), after, mean)
-        paid = float(motor @ moves + work[points.driven].sum() + (weight - borne) @ (moves - time * mean))
+        paid = float(motor @ moves + work[points.driven].sum())
         motions = self._move(moves, segments, drifted)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
@@ -293,6 +291,12 @@ class Articulated:
                 mobility += part @ self._engine.response(name) @ part.T
         after = speed.copy()
         impulse = impulse_kernel.solve(mobility, after, points.friction, target, 1000, 1e-7)
+        if impulse_kernel.violation(mobility, after, points.friction, target, impulse) > COARSE:
+            kept = np.flatnonzero(target > -np.inf)
+            rows = (3 * kept[:, None] + np.arange(3)).ravel()
+            laws = points.friction[kept], target[kept], impulse[kept], 0.1 * COARSE
+            impulse[kept] = impulse_kernel.refine(mobility[np.ix_(rows, rows)], speed[rows], *laws)
+            after = speed + mobility @ impulse.ravel()
         flat = impulse.ravel()
         gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
