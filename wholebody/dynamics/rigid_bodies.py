@@ -253,8 +253,10 @@ class RigidBodies:
         state = self.state
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
-        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, self._yielding)
-        events, ended = program.resolve_impacts(np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0]))
+        ahead = np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0])
+        points = self._finder.points(self._near)
+        program = StepProgram(state, points, self.gravity, self._joints, self._yielding, ahead)
+        events, ended = program.resolve_impacts()
         self._record(events, program, record)
         falling = self._falling & ~self._borne
         program.read_velocities(falling)
