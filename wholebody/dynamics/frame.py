@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -68,6 +68,10 @@ class EngineFrame(NamedTuple):
     sleeping: int
     wrenches: Mapping[str, Array]
     given: tuple[Event, ...]
+
+    def impacts(self, names: Collection[str], speed: float) -> list[Event]:
+        """The impacts with bodies of these names that were faster than a speed, m/s."""
+        return [event for event in self.events if event.speed > speed and {event.first, event.second} & set(names)]
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""The impulses of a figure's contacts and joint limits, as a compiled loop over a dense matrix of mobilities."""
+"""The impulses of a figure's contacts and joint limits, as compiled loops over a dense matrix of mobilities."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from wholebody.dynamics.solve_kernel import FAST, along_way
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
 ROUNDS = 8  # of 50 steps
+COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
 
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
@@ -138,34 +139,38 @@ def violation(mobility: Array, velocity: Array, friction: Array, target: Array, 
     return worst
 
 
-def refine(mobility: Array, speed: Array, friction: Array, target: Array, impulse: Array, tolerance: float) -> Array:
-    """The impulses (m, 3) of `solve` nearer to the solution, by the alternating direction method.
+def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> tuple[Array, Array]:
+    """Impulses (m, 3) along the axes of m points, and the velocities (3 m,) with them; arguments as of `solve`."""
+    velocity = speed.copy()
+    impulse = solve(mobility, velocity, friction, target, 1000, 1e-7)
+    if violation(mobility, velocity, friction, target, impulse) > COARSE:
+        kept = np.flatnonzero(target > -np.inf)
+        rows = (3 * kept[:, None] + np.arange(3)).ravel()
+        impulse[kept] = _refined(mobility[np.ix_(rows, rows)], speed[rows], friction[kept], target[kept], impulse[kept])
+        velocity = speed + mobility @ impulse.ravel()
+    return impulse, velocity
+
+
+def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impulse: Array) -> Array:
+    """The impulses (m, 3) of `solve` or, if they are nearer to the solution, those of the alternating direction method.
 
     Sweeps do not end where much rests on little: an impulse passes a thousandth of itself on in each. This method
     factors the matrix, with weights that follow what breaks more, the program or the laws of contact.
-
-    Args:
-        mobility: (3 m, 3 m), as in `solve`.
-        speed: (3 m,) velocities without impulses, m/s.
-        friction: (m,).
-        target: (m,) least velocities along the normals, m/s.
-        impulse: (m, 3) where it begins.
-        tolerance: violation at which it ends, m/s.
     """
     rest = speed.copy()
     rest[::3] -= target
     own = np.maximum(mobility.diagonal().reshape(-1, 3), 1e-9)
     own[:, 1:] = own[:, 1:].max(axis=1)[:, None]
     now, dual, share = np.zeros_like(rest), -rest, 1e-3
-    best, least = impulse, violation(mobility, speed + mobility @ now, friction, target, impulse)
+    best, least = impulse, violation(mobility, speed + mobility @ impulse.ravel(), friction, target, impulse)
     for _ in range(ROUNDS):
         weight = share * own.ravel()
-        inverse = np.linalg.inv(mobility + np.diag(weight))
+        inverse = np.linalg.inv(mobility + np.diag(weight)).astype(np.float64)
         broken, moved = _split(inverse, weight, rest, friction, now, dual, 50)
         off = violation(mobility, speed + mobility @ now, friction, target, now.reshape(-1, 3))
         if off < least:
             best, least = now.reshape(-1, 3).copy(), off
-        if off < tolerance:
+        if off < 0.1 * COARSE:
             break
         ratio = broken / max(share * moved, 1e-300)
         if not 0.2 < ratio < 5.0:
