@@ -69,9 +69,10 @@ class EngineFrame(NamedTuple):
     wrenches: Mapping[str, Array]
     given: tuple[Event, ...]
 
-    def impacts(self, names: Collection[str], speed: float) -> list[Event]:
-        """The impacts with bodies of these names that were faster than a speed, m/s."""
-        return [event for event in self.events if event.speed > speed and {event.first, event.second} & set(names)]
+
+def impacts(events: Sequence[Event], names: Collection[str], speed: float) -> list[Event]:
+    """The impacts with bodies of these names that were faster than a speed, m/s."""
+    return [event for event in events if event.speed > speed and (event.first in names or event.second in names)]
 
 
 @dataclass
@@ -92,6 +93,10 @@ class FrameRecord:
     coulomb: float = 0.0
     steps: int = 0
     given_up: int = 0  # steps that were halved as often as they may be, and still led too deep
+
+    def met(self, names: Collection[str], speed: float) -> bool:
+        """Whether an impact with bodies of these names was faster than a speed, m/s."""
+        return bool(impacts(self.events, names, speed))
 
     def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:
         """The frame, with the names of the bodies."""

@@ -67,7 +67,7 @@ class StepProgram:
         gravity: Array,
         joints: Joints,
         yielding: Mask,
-        ahead: Array | float = 0.0,
+        ahead: Array | None = None,
     ) -> None:
         """Begin a step.
 
@@ -80,7 +80,8 @@ class StepProgram:
             ahead: (n, 6) what weight adds during the step to bodies that pushes gave its opposite: without it they
                 would seem to rise, and to meet what lies on them.
         """
-        self.state, self.points, self.gravity, self.joints, self._ahead = state, points, gravity, joints, ahead
+        self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
+        self._ahead = np.zeros_like(state.bodies.twist) if ahead is None else ahead
         self._yielding = yielding
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
@@ -171,7 +172,9 @@ class StepProgram:
         state, points = self.state, self.points
         twist, moving = state.bodies.twist, state.bodies.moving
         began = twist.copy()
-        state.velocity[moving] += time * self.gravity
+        # what is held has all of its fall at once: it does not rise in a step that ends early
+        held = self._ahead[:, :3]
+        state.velocity[moving] += np.where(held.any(axis=1)[:, None], held, time * self.gravity)[moving]
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
