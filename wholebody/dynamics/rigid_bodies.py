@@ -256,8 +256,8 @@ class RigidBodies:
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
         planned, ahead = time, np.outer(time * (self._borne & state.bodies.moving), [*self.gravity, 0.0, 0.0, 0.0])
-        points, joints = self._finder.points(self._near), self._joints
-        program = StepProgram(state, points, self.gravity, joints, self._yielding, ahead)
+        points = self._finder.points(self._near)
+        program = StepProgram(state, points, self.gravity, self._joints, self._yielding, ahead)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
         falling = self._falling & ~self._borne
@@ -269,9 +269,8 @@ class RigidBodies:
         halvings, predicted = 0, 0
         while True:
             self._move(program, time, together, start, before.kept)
-            impulse = program.world_impulse()
+            impulse, least = program.world_impulse(), self._find_near(STEP)
             record.steps += 1
-            least = self._find_near(STEP)
             if record.given_up >= 3:  # then nothing helps, as where bodies are pushed together
                 break
             if halvings == 6:
@@ -296,7 +295,7 @@ class RigidBodies:
         self._old = program.remembered(time)
         work = program.work()
         record.work += float(work.sum())
-        joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
+        self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
         state.bodies.twist[:] -= (1.0 - time / planned) * ahead  # what the rest of it will add
         by = np.flatnonzero(impulse.any(axis=1) & state.bodies.given[program.points.bodies].any(axis=1))

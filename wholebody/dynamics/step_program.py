@@ -174,7 +174,7 @@ class StepProgram:
         began = twist.copy()
         # what is held has all of its fall at once: it does not rise in a step that ends early
         held = self._ahead[:, :3]
-        state.velocity[moving] += np.where(held.any(axis=1)[:, None], held, time * self.gravity)[moving]
+        state.velocity[moving] += np.where((held != 0.0).any(axis=1, keepdims=True), held, time * self.gravity)[moving]
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
