@@ -319,7 +319,7 @@ def test_a_box_comes_to_rest_on_a_hand() -> None:
     hand = wb.load("hand")
     start = hand.posture("open").copy()
     start[3:7] = pin.Quaternion(pin.utils.rotate("x", np.pi) @ pin.XYZQUATToSE3(start[:7]).rotation).coeffs()
-    place = hand.placement(start, "right_palm").translation + (0.03, 0.012, 0.03)
+    place = hand.placement(start, "right_palm").translation + (0.031, 0.012, 0.03)
     scene = wb.Scene(hand)
     scene.add(wb.Box((0.05, 0.05, 0.03)), name="box", at=place, body=wb.Body(mass=0.5, material="human"))
     stiff = wb.Actuated(hand, stiffness={"root": 3000.0, **dict.fromkeys(hand.joints, 5.0)})

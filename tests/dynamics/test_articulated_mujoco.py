@@ -83,3 +83,29 @@ def test_an_elastic_blow_gives_the_joints_and_the_ball_the_velocities_of_mujoco(
     assert np.abs(data.qvel[:3]).max() > 1.0  # rad/s
     assert moving.velocity == pytest.approx(data.qvel[:3], abs=0.1)  # a contact of MuJoCo takes 0.3 ms
     assert engine.twist("ball")[:3] == pytest.approx(data.qvel[3:6], abs=0.03)
+
+
+def test_a_swinging_beam_gives_an_arm_the_impulse_that_it_gives_in_mujoco(tmp_path: Path) -> None:
+    figure, text = arm_of(tmp_path, 0.0, 0.0, 0.0, DT / 4000)
+    swing = """<body name="beam" pos=".75 .01 1.14">
+    <joint name="hinge" pos=".25 0 0" axis="0 1 0" stiffness="0" damping="0"/>
+    <geom type="box" size=".25 .04 .02" mass="3"/></body>"""
+    model = mujoco.MjModel.from_xml_string(text.replace("{ball}", swing))
+    data, speed, met = mujoco.MjData(model), -6.0, False
+    data.qvel[3] = speed
+    while not met or data.ncon:
+        mujoco.mj_step(model, data)
+        met |= data.ncon > 0
+    material = wb.dynamics.Material("elastic", {"human": (1.0, 0.0)})
+    hinge = wb.dynamics.Hinge((0.25, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    turning, velocity = (0.0, speed, 0.0), (0.0, 0.0, 0.25 * speed)
+    beam = wb.Body(mass=3.0, material=material, velocity=velocity, angular_velocity=turning, joints=[hinge])
+    scene = wb.Scene(figure).add(wb.Box((0.5, 0.08, 0.04)), name="beam", at=(0.75, 0.01, 1.14), body=beam)
+    engine = RigidBodies(scene, (0.0, 0.0, 0.0), np.zeros(3))
+    moving = Articulated(scene, np.zeros(3), wb.Actuated(figure, stiffness=0.0, damping=0.0), engine)
+    segments, began = {name: scene.frame_id(name) for name in figure.segments}, engine.energy()
+    while not moving.impulses:
+        moving.advance(moving.q, 2.5e-4, {}, segments)
+    assert engine.twist("beam")[4] == pytest.approx(data.qvel[3], abs=1e-5)  # rad/s
+    assert moving.velocity == pytest.approx(data.qvel[:3], abs=0.01)
+    assert engine.energy() + moving.energy() == pytest.approx(began, rel=1e-9)

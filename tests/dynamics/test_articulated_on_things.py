@@ -41,18 +41,42 @@ def test_a_rod_topples_on_a_loose_box_as_one_about_a_fixed_edge(tmp_path: Path) 
     assert np.array(heights) - 0.3 == pytest.approx(length * np.cos(end.y[0]), abs=0.015)  # it fell by 0.08
 
 
-def test_a_limp_person_who_falls_on_loose_boxes_adds_no_energy() -> None:
-    human = wb.load("human")
-    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
-    for x in (-0.1, 0.25):
-        for y in (-0.2, 0.15):
-            body = wb.Body(mass=10.0)
-            scene.add(wb.Box((0.3, 0.3, 0.3)), name=f"box at {x}, {y}", at=(x, y, 0.16), body=body)
-    start = human.posture("standing").copy()
-    start[2] += 0.31
-    world = wb.World(scene, start, spring=wb.Actuated(human, stiffness=0.0, damping=0.0))
+def test_a_limp_person_who_falls_on_loose_boxes_adds_no_energy_and_rests() -> None:
+    figure = wb.load("avatar")
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    for k, (x, y) in enumerate(((-0.3, 0.0), (0.35, 0.05))):
+        scene.add(wb.Box((0.25, 0.3, 0.15)), name=f"box {k}", at=(x, y, 0.0751), body=wb.Body(mass=5.0))
+    start = figure.posture("standing").copy()
+    start[2], start[3:7] = 0.45, (0.0, np.sin(-0.75), 0.0, np.cos(0.75))  # on its back, in the air
+    world = wb.World(scene, start, spring=wb.Actuated(figure, stiffness=0.0, damping=0.0))
     energies = [world.energy]
-    for _ in range(12):
+    for _ in range(80):  # it gained 4 mJ in a frame as it came to rest, after 60 frames
         assert world.step().deepest < 1e-3
         energies.append(world.energy)
     assert np.diff(energies).max() < 1e-6
+    assert energies[-21] - energies[-1] < 0.5  # J, of 100 and more that it fell
+
+
+def test_limp_rods_bear_others_that_weigh_a_thousand_times_as_much(tmp_path: Path) -> None:
+    rods = {}
+    for k, mass in enumerate((1.0, 1.0, 1.0, 1.0, 1000.0, 1000.0)):
+        across, path = mass / 12.0, tmp_path / f"rod{k}.urdf"
+        path.write_text(
+            f"""<robot name="rod"><link name="rod"><inertial><mass value="{mass}"/>
+            <inertia ixx="{across / 50}" iyy="{across}" izz="{across}" ixy="0" ixz="0" iyz="0"/></inertial>
+            <collision><geometry><box size="1 0.05 0.05"/></geometry></collision></link></robot>"""
+        )
+        rods[f"rod{k}"] = wb.load(path, root="free")
+    scene = wb.Scene(rods)
+    scene.add(wb.HalfSpace(), name="floor")
+    start = scene.figure.neutral.copy()
+    for k in range(6):  # two on the floor, two across them, two across those
+        layer, off = k // 2, (-0.3, 0.3)[k % 2]
+        turn = (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)) if layer % 2 else (0.0, 0.0, 0.0, 1.0)
+        start[7 * k : 7 * k + 7] = *((off, 0.0) if layer % 2 else (0.0, off)), 0.0252 + 0.0504 * layer, *turn
+    world = wb.World(scene, start, spring=wb.Actuated(scene.figure, stiffness=0.0, damping=0.0))
+    energies = [world.energy]
+    for _ in range(14):
+        assert world.step().deepest < 1e-5  # 1.3 mm where sweeps alone solved the program
+        energies.append(world.energy)
+    assert np.diff(energies).max() < 1e-6  # 3.9 J in the twelfth frame

@@ -25,7 +25,7 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
 from wholebody.dynamics.figure_points import Moved, Points, axes_of
-from wholebody.dynamics.frame import EngineFrame, Event
+from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.pieces import places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
@@ -35,6 +35,7 @@ from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
+STOPS = 12  # steps of a frame that are made again to end at an impact: what is squeezed meets thousands
 FASTEST = 0.5  # m/s, at most
 
 
@@ -78,7 +79,7 @@ class Articulated:
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        now, left, self.impulses, self.frames, self.ends = 0.0, dt, {}, [], []
+        now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, STOPS, {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, STEP)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
@@ -107,17 +108,18 @@ class Articulated:
         """Advance by at most a time, to the next impact if that comes first; by how much.
 
         The engine sees the figure as something that is moved. Where it finds an impact with it that the program of
-        the figure's contacts did not foresee, as that turns on the way, the step is made again, and ends there.
+        the figure's contacts did not foresee, the step is made again, and ends there; after `STOPS` the next has it.
         """
         figure, impulses = (self.q, self.velocity), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
         most = time
         while True:
             done, frame = self._attempt(most, time, aim, steady, moved, segments)
-            met = [] if frame is None else [event.time for event in _met(frame, segments)]
-            if not met or done <= SHORTEST or back is None:
+            met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
+            if not met or done <= SHORTEST or self._stops <= 0 or back is None:
                 self.frames += [] if frame is None else [frame]
                 return done
+            self._stops -= 1
             most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
             (self.q, self.velocity), self.impulses = figure, impulses.copy()
             back()
@@ -143,19 +145,18 @@ class Articulated:
             self.velocity = np.linalg.solve(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
-        unborne, sprung = self.velocity, self.stiffness > 0.0
-        bearing = self._bear(driven, points, time)
-        impulse, after = blow + bearing, self.velocity
-        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, bool(bearing.any()))
+        bearing, parting = self._bear(driven, points, time)
+        impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
+        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, pressed)
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        ways = start + begin, np.where(sprung, after, unborne) + after
-        first, last = (points.figure @ (0.5 * both) for both in ways)
+        # springs and contacts are implicit; what is free of them moves by the mean of both velocities
+        moves = time * np.where((self.stiffness > 0.0) | pressed, after, mean)
+        first, last = points.figure @ (0.5 * (start + begin)), points.figure @ after
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
-        # springs and contacts are implicit; what is free of them moves by the mean of both velocities, and limp
-        # freedoms are paid for the fall that contacts prevent
-        moves = time * np.where(sprung | bearing.any(), after, mean)
-        paid = float(motor @ moves + work[points.driven].sum() + (weight - borne) @ (moves - time * mean))
-        motions = self._move(moves, segments, drifted)
+        # what parts an overlap has its energy from nowhere
+        work -= np.maximum(0.0, (bearing * parting.reshape(-1, 3)).sum(axis=1))
+        paid = float(motor @ moves + work[points.driven].sum())
+        motions = self._move(moves, segments, drifted, np.inf if self.stiffness.any() else began + paid)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
@@ -163,14 +164,15 @@ class Articulated:
             return time, None
         held = {name for name, c, *_ in points.pushes if bearing[c].any()}
         energy = engine.energy()
-        frame = engine.advance(time, motions, held, segments)
+        again = time > SHORTEST and self._stops > 0
+        frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
         twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
-        given = self._left_for_later(frame, segments, energy) if time <= SHORTEST else frame.wrenches
+        given = frame.wrenches if again else self._left_for_later(frame, segments, energy)
         self._react(given, twists, segments)
         return time, frame
 
     def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
-        """The wrenches of the shortest step without its impacts with the figure, which the next step has at its start.
+        """The wrenches of a step without its impacts with the figure, which the next step has at its start.
 
         To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere. Blows that
         alternate with those of something else, as on what is squeezed, are taken back to the energy `most` [J].
@@ -178,8 +180,8 @@ class Articulated:
         wrenches, engine = dict(frame.wrenches), self._engine
         met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
         met += [(second, first, -impulse, point) for first, second, impulse, point in met]
-        blows = [blow for blow in met if blow[0] in segments] if _met(frame, segments) else []
-        if engine is None or not blows:
+        blows = [blow for blow in met if blow[0] in segments]
+        if engine is None or not blows or not impacts(frame.events, segments, BOUNCE):
             return wrenches
 
         def taken_back(share: float) -> float:
@@ -266,14 +268,12 @@ class Articulated:
         approach = speed[::3]
         hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
-        touching = points.gap <= 2.0 * SKIN
-        target = np.where(touching & ~hit, 0.0, target)  # what is pressed together passes the blow on
-        return self._solved(inertia, points, speed, target, True) if hit.any() else np.zeros((len(target), 3))
+        target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
+        return self._solved(inertia, points, speed, target, True)[0] if hit.any() else np.zeros((len(target), 3))
 
-    def _bear(self, inertia: Array, points: Points, time: float) -> Array:
-        """Keep points apart at the end of a step; the impulses (m, 3)."""
-        room = points.gap - SKIN
-        # a step removes a fifth of an overlap
+    def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Array, Array]:
+        """Keep points apart at the end of a step; impulses (m, 3), and the velocities (3 m,) there."""
+        room = points.gap - SKIN  # a step removes a fifth of an overlap
         target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, FASTEST))
         speed = self._relative(points)
         if points.bodies and self._engine is not None:
@@ -281,40 +281,53 @@ class Articulated:
             speed = speed + time * (points.things @ np.concatenate(fall))
         return self._solved(inertia, points, speed, target)
 
-    def _solved(self, inertia: Array, points: Points, speed: Array, target: Array, blow: bool = False) -> Array:
-        """Impulses (m, 3) that bring the points to least normal velocities; those of a blow add no kinetic energy."""
+    def _solved(
+        self, inertia: Array, points: Points, speed: Array, target: Array, blow: bool = False
+    ) -> tuple[Array, Array]:
+        """Impulses (m, 3) that bring the points to least normal velocities, and the velocities (3 m,) with them.
+
+        Those of a blow add no kinetic energy.
+        """
         if not len(target):
-            return np.zeros((0, 3))
+            return np.zeros((0, 3)), speed
         answer = np.linalg.solve(inertia, points.figure.T)
         mobility = points.figure @ answer
         if points.bodies and self._engine is not None:
             for b, name in enumerate(points.bodies):
                 part = points.things[:, 6 * b : 6 * b + 6]
                 mobility += part @ self._engine.response(name) @ part.T
-        after = speed.copy()
-        impulse = impulse_kernel.solve(mobility, after, points.friction, target, 1000, 1e-7)
+        impulse, after = impulse_kernel.impulses(mobility, speed, points.friction, target)
         flat = impulse.ravel()
         gain = float(flat @ (speed + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
             impulse = impulse * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+            after = speed + mobility @ impulse.ravel()
         self.velocity = self.velocity + answer @ impulse.ravel()
         for name, c, place, axes in points.pushes:
             push = impulse[c] @ axes
             if push.any():
                 self._engine.push(name, push, place)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
-        return impulse
+        return impulse, after
 
     def _move(
-        self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]]
+        self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float
     ) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints by a way (nv,), and centres of mass to their places; the motions of the segments."""
+        """Move the joints by a way (nv,), and centres of mass to their places; the motions of the segments.
+
+        Nothing rises beyond a potential energy [J]: what lies still is not parted from what it overlaps.
+        """
         model, data, before = self._model, self._data, self._placements(segments)
-        self.q = np.array(pin.integrate(model, self.q, way))
+        start, lowest = self.q, float(pin.computePotentialEnergy(model, data, self.q))
+        self.q = np.array(pin.integrate(model, start, way))
         pin.centerOfMass(model, data, self.q)
         for root, (_, centre) in zip(self._roots, drifted, strict=True):
             first, seat = model.idx_qs[root], model.jointPlacements[root].rotation
             self.q[first : first + 3] += seat.T @ (centre - data.oMi[root].act(data.com[root]))
+        rise, most = float(pin.computePotentialEnergy(model, data, self.q)) - lowest, max(0.0, energy - lowest)
+        if rise > most:  # of so little, the rise is nearly proportional to the way
+            part = 0.99 * most / rise * pin.difference(model, start, self.q)
+            self.q = np.array(pin.integrate(model, start, part))
         after = self._placements(segments)
         return {name: (before[name], after[name]) for name in segments}
 
@@ -385,12 +398,3 @@ class Articulated:
         pushed, first = inertia @ self.velocity, model.idx_vs
         momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
         self._settle(energy, 1.0, momenta)
-
-
-def _met(frame: EngineFrame, segments: Mapping[str, int]) -> list[Event]:
-    """The impacts of a frame with the figure."""
-    return [
-        event
-        for event in frame.events
-        if event.speed > BOUNCE and not segments.keys().isdisjoint((event.first, event.second))
-    ]

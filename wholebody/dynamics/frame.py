@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -70,6 +70,11 @@ class EngineFrame(NamedTuple):
     given: tuple[Event, ...]
 
 
+def impacts(events: Sequence[Event], names: Collection[str], speed: float) -> list[Event]:
+    """The impacts with bodies of these names that were faster than a speed, m/s."""
+    return [event for event in events if event.speed > speed and (event.first in names or event.second in names)]
+
+
 @dataclass
 class FrameRecord:
     """A frame while it is being made; attributes as in `EngineFrame`."""
@@ -88,6 +93,10 @@ class FrameRecord:
     coulomb: float = 0.0
     steps: int = 0
     given_up: int = 0  # steps that were halved as often as they may be, and still led too deep
+
+    def met(self, names: Collection[str], speed: float) -> bool:
+        """Whether an impact with bodies of these names was faster than a speed, m/s."""
+        return bool(impacts(self.events, names, speed))
 
     def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:
         """The frame, with the names of the bodies."""

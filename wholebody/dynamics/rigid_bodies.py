@@ -187,6 +187,7 @@ class RigidBodies:
         kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None,
         borne: Collection[str] = (),
         yielding: Collection[str] = (),
+        until: float = np.inf,
     ) -> EngineFrame:
         """Advance by a frame.
 
@@ -197,6 +198,7 @@ class RigidBodies:
             borne: bodies that pushes given before bear during the frame: they move with their velocity at its end.
             yielding: segments whose motion is that of a figure to which their impulses are given after the frame. To
                 contacts they weigh what their joints carry; others of `kinematic` are as heavy as anything.
+            until: ends the frame early, to be taken back, where an impact with those is faster than this, m/s.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
         state, given = self.state, {self._number(name): pair for name, pair in given_placements(kinematic).items()}
@@ -216,7 +218,7 @@ class RigidBodies:
         self._find_near(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
-            while end - record.time > 1e-9 * dt:
+            while end - record.time > 1e-9 * dt and not record.met(yielding, until):
                 self._step(end - record.time, record)
         for number, (_, after) in given.items():
             state.put(number, after)
@@ -253,8 +255,10 @@ class RigidBodies:
         state = self.state
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
-        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, self._yielding)
-        events, ended = program.resolve_impacts(np.outer(time * self._borne, [*self.gravity, 0.0, 0.0, 0.0]))
+        planned, ahead = time, np.outer(time * (self._borne & state.bodies.moving), [*self.gravity, 0.0, 0.0, 0.0])
+        points = self._finder.points(self._near)
+        program = StepProgram(state, points, self.gravity, self._joints, self._yielding, ahead)
+        events, ended = program.resolve_impacts()
         self._record(events, program, record)
         falling = self._falling & ~self._borne
         program.read_velocities(falling)
@@ -265,9 +269,8 @@ class RigidBodies:
         halvings, predicted = 0, 0
         while True:
             self._move(program, time, together, start, before.kept)
-            impulse = program.world_impulse()
+            impulse, least = program.world_impulse(), self._find_near(STEP)
             record.steps += 1
-            least = self._find_near(STEP)
             if record.given_up >= 3:  # then nothing helps, as where bodies are pushed together
                 break
             if halvings == 6:
@@ -294,6 +297,7 @@ class RigidBodies:
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
+        state.bodies.twist[:] -= (1.0 - time / planned) * ahead  # what the rest of it will add
         by = np.flatnonzero(impulse.any(axis=1) & state.bodies.given[program.points.bodies].any(axis=1))
         record.given += self._events(program, record.time, by, np.zeros(len(by)), impulse[by])
         wrench = np.hstack([impulse, cross(program.points.point, impulse)])
@@ -376,11 +380,11 @@ class RigidBodies:
         state = self.state
         before, position = self.energy(), state.bodies.position.copy()
         for _ in range(4):
-            still = np.zeros_like(self._yielding)
-            program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints, still)
+            last, points = least, self._finder.points(self._near)
+            program = StepProgram(state, points, self.gravity, self._joints, np.zeros_like(self._yielding))
             motion_kernel.displace(state.bodies, program.separation(0.5 * SKIN))
             least = self._find_near(STEP)
-            if least >= LEAST_GAP:
+            if least >= LEAST_GAP or least < 0.9 * last:  # what is squeezed cannot be parted
                 break
         gain = self.energy() - before
         if gain > 0.0:

@@ -61,10 +61,27 @@ class StepProgram:
     """
 
     def __init__(
-        self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints, yielding: Mask
+        self,
+        state: BodiesState,
+        points: ContactPoints,
+        gravity: Array,
+        joints: Joints,
+        yielding: Mask,
+        ahead: Array | None = None,
     ) -> None:
-        """`yielding` (n,): bodies whose motion is given and that the program takes to have their masses."""
+        """Begin a step.
+
+        Args:
+            state: of the bodies.
+            points: the contact points.
+            gravity: (3,) m/s2.
+            joints: between the bodies.
+            yielding: (n,) bodies whose motion is given and that the program takes to have their masses.
+            ahead: (n, 6) what weight adds during the step to bodies that pushes gave its opposite: without it they
+                would seem to rise, and to meet what lies on them.
+        """
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
+        self._ahead = np.zeros_like(state.bodies.twist) if ahead is None else ahead
         self._yielding = yielding
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
@@ -79,7 +96,7 @@ class StepProgram:
     def read_velocities(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
         bodies, normal = self.points.bodies, self.points.normal
-        self.speed = self._rates(self.state.bodies.twist)[: len(normal), 0]
+        self.speed = self._rates(self.state.bodies.twist + self._ahead)[: len(normal), 0]
         fall = (self.state.bodies.moving & falling).astype(float)
         self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
         self.hits = impact_times(self.points.gap - SKIN, self.speed, self._pull)
@@ -129,13 +146,9 @@ class StepProgram:
         # what bears a body is known to the next points that join the step
         self.impulse = inserted(self.impulse, np.zeros((len(gap), 3)))
 
-    def resolve_impacts(self, ahead: Array) -> tuple[Array, bool]:
-        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.
-
-        `ahead` (n, 6) is what weight adds during the step to bodies that pushes gave its opposite: without it they
-        would seem to rise, and to meet what lies on them.
-        """
-        twist = self.state.bodies.twist + ahead
+    def resolve_impacts(self) -> tuple[Array, bool]:
+        """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left."""
+        twist = self.state.bodies.twist + self._ahead
         if not (self._touching & (self._rates(twist)[: len(self.speed), 0] < -SLOW)).any():
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
@@ -147,7 +160,7 @@ class StepProgram:
             np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
             events,
         )  # fmt: skip
-        state.bodies.twist[state.bodies.moving] = (twist - ahead)[state.bodies.moving]
+        state.bodies.twist[state.bodies.moving] = (twist - self._ahead)[state.bodies.moving]
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
@@ -159,7 +172,9 @@ class StepProgram:
         state, points = self.state, self.points
         twist, moving = state.bodies.twist, state.bodies.moving
         began = twist.copy()
-        state.velocity[moving] += time * self.gravity
+        # what is held has all of its fall at once: it does not rise in a step that ends early
+        held = self._ahead[:, :3]
+        state.velocity[moving] += np.where((held != 0.0).any(axis=1, keepdims=True), held, time * self.gravity)[moving]
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
