@@ -6,10 +6,10 @@ joints between it and a frame that the problem holds in the world, stay, so that
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.methods.base import Tracker
 from wholebody.methods.control import Progress
 from wholebody.methods.differential import NEGLIGIBLE
-from wholebody.methods.starts import SPREADS, restarts
+from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
@@ -104,9 +104,7 @@ def starts(problem: Problem) -> Iterator[Array]:
     with problem.borrow() as workspace:
         deepest = _depth(workspace, problem.start) + 1e-4  # m: by which a start may overlap more than the problem's own
         failures = 0
-        for number in count():
-            spread = (SPREADS[number % len(SPREADS)],)
-            (drawn,) = restarts(problem, workspace.state, problem.start, rng, 1, spread)
+        for drawn in restarts(problem, workspace.state, problem.start, rng, sys.maxsize):
             move = np.where(moving, pin.difference(figure.model, problem.start, drawn), 0.0)
             start: Array = figure.clamp(np.asarray(pin.integrate(figure.model, problem.start, move)))
             failures = 0 if _depth(workspace, start) <= deepest else failures + 1
