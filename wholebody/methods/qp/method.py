@@ -43,7 +43,8 @@ class QP(Settings, Descends):
             where that does not settle. Otherwise every program is the solver's. The answers are the same to rounding;
             `Solution.programs` says how many programs each closed.
         tolerance: metres and radians to which goals and constraints are met.
-        iterations: most programs for one descent.
+        iterations: most programs for one descent; one that ends there while the measures decrease goes on, within the
+            budget.
         budget: most programs that restarts may add when no descent from the start reaches the goals; a program takes
             about a millisecond.
         restarts: most seeded starts that are tried.

@@ -76,6 +76,7 @@ class Multistart:
         if other is not None:
             self._accept(self.directly(other), "directly")
         self._find_closest()
+        self._go_on()
         self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
@@ -232,6 +233,13 @@ class Multistart:
         if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
             self._accept(self._descend(local.q), self.how)
         return self.best.measure < SEARCH.moved * before
+
+    def _go_on(self) -> None:
+        """Descend on where a descent had spent its programs while the measures still decreased."""
+        gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
+        while gains and not self.best.converged and self._left > 0 and not self.control.over:
+            before = self.best.measure
+            gains = self._accept(self._descend(self.best.q), self.how) and self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
