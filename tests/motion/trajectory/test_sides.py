@@ -47,7 +47,7 @@ def test_the_first_part_is_on_the_side_where_all_parts_deviate_less(planar_arm: 
 
 
 @pytest.mark.parametrize(("passed", "ends"), [(0.029, False), (0.031, True)])
-def test_what_passes_a_thing_by_more_than_a_step_asks_for_is_not_gone_on_with(
+def test_what_passes_a_thing_by_more_than_a_step_asks_for_waits_for_other_starts(
     planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch, passed: float, ends: bool
 ) -> None:
     clip, scene = through_a_ball(planar_arm, np.linspace(0.3, 0.05, 30))

@@ -2,7 +2,7 @@
 
 An attempt solves the window's program, sweeps the motions between frames, adds rows at the places where they dip, and
 goes on from its answer until nothing dips. Attempts begin at the original postures, then on one side of what these
-pass. One whose shortfall stays is on the wrong side: others are tried before it is gone on with.
+pass. One whose shortfall stays, or that passes through a thing, is on the wrong side: others are tried before it goes on.
 """
 
 from __future__ import annotations
@@ -263,8 +263,9 @@ class ClipRun:
             if found.end is End.EARLY:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
             dipping = self._dipping(own, x)
-            passes = way.largest is None and max(dipping.values(), default=0.0) > ONE_STEP
-            if not found.met or passes:  # rows bring nothing back that passes a thing; other starts are beside it
+            if way.early and max(dipping.values(), default=0.0) > ONE_STEP:  # other starts are beside what it passes
+                return _Attempt(x, found.worst, len(dipping), found.objective, True, program.between)
+            if not found.met:
                 break
             before = len(program.nodes)
             program.add(self._places(own, x, dipping))
