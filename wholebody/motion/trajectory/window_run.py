@@ -2,7 +2,8 @@
 
 An attempt solves the window's program, sweeps the motions between frames, adds rows at the places where they dip, and
 goes on from its answer until nothing dips. Attempts begin at the original postures, then on one side of what these
-pass. One whose shortfall stays, or that passes through a thing, is on the wrong side: others are tried before it goes on.
+pass. One whose shortfall stays, or that passes through a thing, is on the wrong side: others are tried before it goes
+on.
 """
 
 from __future__ import annotations
