@@ -16,9 +16,9 @@ from wholebody.motion.one_side import followed
 from wholebody.motion.trajectory import method as trajectory
 from wholebody.motion.trajectory import window_run
 from wholebody.motion.trajectory.deviations import Objective
-from wholebody.motion.trajectory.nodes import Node, Rows
+from wholebody.motion.trajectory.nodes import MET, Node, Rows
 from wholebody.motion.trajectory.program import Limits
-from wholebody.motion.trajectory.sqp import MET, End, SQPResult, WindowProgram
+from wholebody.motion.trajectory.sqp import End, SQPResult, WindowProgram
 from wholebody.motion.windows import Window
 
 

@@ -19,8 +19,9 @@ from wholebody.motion.trajectory.loads import WindowLoads
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint, Goal
 
-ALLOWED = 6e-5  # m: an overlap between frames that is no dip, and is met by as much as a frame is; see `faults.DIP`
-ROOM = 1e-4 + ALLOWED
+MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
+ALLOWED = 4e-5  # m: of an overlap between frames, so that what is met is no dip, nor is what is beside it; `faults.DIP`
+ROOM = 1e-4 + ALLOWED  # m
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
 Terms = Sequence[Constraint | Goal]
@@ -67,8 +68,8 @@ class Rows(NamedTuple):
 
         Soles that rest sink a little between frames. Room of them too would bend the whole body at every frame.
         """
-        room = self.node.room
-        asked: Array = np.where(self.gap < 0.0, room, np.minimum(self.gap, room))
+        room, least = self.node.room, -MET if self.node.share else 0.0
+        asked: Array = np.where(self.gap < least, room, np.minimum(self.gap, room))
         return asked
 
     @property

@@ -19,7 +19,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.trajectory.interior_point import minimise
-from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
+from wholebody.motion.trajectory.nodes import MET, Node, NodeEvaluator, Rows
 from wholebody.motion.trajectory.program import (
     ONE_STEP,
     SOFT,
@@ -33,7 +33,6 @@ from wholebody.motion.trajectory.program import (
     within_reach,
 )
 
-MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
 FAR = 2e-3  # m, rad: with a shortfall no larger, a run that may end early goes on
 
 Cancel = Callable[[int, float], bool]

@@ -24,9 +24,9 @@ from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
-from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
+from wholebody.motion.trajectory.nodes import MET, NEAREST, Node, NodeEvaluator
 from wholebody.motion.trajectory.program import ONE_STEP, Limits
-from wholebody.motion.trajectory.sqp import FAR, MET, End, WindowProgram
+from wholebody.motion.trajectory.sqp import FAR, End, WindowProgram
 from wholebody.motion.windows import Window
 
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
@@ -241,8 +241,9 @@ class ClipRun:
                 yield own.deviations(followed(self._run, window, middle))
 
     def _goes_on(self, own: _Window) -> bool:
-        """Whether a window goes on from a posture that another one changed."""
-        return own.seams[0] and bool((own.around[own.window.first] != own.chart.original[0]).any())
+        """Whether a window goes on from a posture that another one moved far, so to a side of something."""
+        away = own.chart.deviation(0, own.around[own.window.first])
+        return own.seams[0] and bool(np.abs(away).max() > NEARLY)
 
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
