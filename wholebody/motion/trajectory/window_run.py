@@ -148,13 +148,14 @@ class ClipRun:
             starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
-        for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
+        for start, way in chain(starts, ((start, _Way()) for start in _promising(ended_early))):
             attempt = self._attempt(start, own, objective, way)
             if attempt is None:
                 return WindowResult(own.chart.original, "")
             if attempt.early and patient:
                 ended_early.append(attempt)
-                continue
+                if attempt.worst > MET:
+                    continue
             best = attempt if best is None or attempt.rank < best.rank else best
             if best.free:
                 break
@@ -285,6 +286,14 @@ class ClipRun:
         found = dips(self._run.workspace, own.chart.postures(x), gaps)
         places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
+
+
+def _promising(ended: Iterable[_Attempt]) -> Iterator[_Attempt]:
+    """Attempts that ended early and are gone on with: those with a shortfall, and the best that passes a thing."""
+    ended = sorted(ended, key=lambda one: one.rank)
+    for number, attempt in enumerate(ended):
+        if not number or attempt.worst > MET:
+            yield attempt
 
 
 def _nearest_first(starts: Iterable[Array], objective: Objective) -> Iterator[Array]:
