@@ -254,11 +254,15 @@ def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) 
     skate = wb.Box((0.2, 0.02, 0.04))
     floor.attach(skate, to="left_foot", name="skate", at=(0.05, 0.0, -0.09), rests_on=["left_foot", "left_toes"])
     with pytest.warns(UserWarning, match=r"skate .* inside floor.*hold_feet=False"):
-        wb.avoid(clip, floor, progress=lambda _: True)
+        carried = wb.avoid(clip, floor, progress=lambda _: True).report
+    assert not carried.solved
+    assert "inside floor" in carried.message
     at = human.placement(clip.q[0], "right_palm").translation
     beside = wb.Scene(human).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=at)
     with pytest.warns(UserWarning, match=r"right_hand .* inside box"):
-        wb.avoid(clip, beside, constraints=[wb.Hold("right_palm")], progress=lambda _: True)
+        held = wb.avoid(clip, beside, constraints=[wb.Hold("right_palm")], progress=lambda _: True).report
+    assert not held.solved
+    assert "inside box" in held.message
 
 
 def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Figure) -> None:

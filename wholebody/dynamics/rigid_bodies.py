@@ -218,7 +218,7 @@ class RigidBodies:
         self._find_near(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
-            while end - record.time > 1e-9 * dt and not record.met(yielding, until):
+            while end - record.time > 1e-9 * dt and not (until < np.inf and record.met(yielding, until)):
                 self._step(end - record.time, record)
         for number, (_, after) in given.items():
             state.put(number, after)

@@ -35,9 +35,9 @@ REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by st
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
 LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
-LOOSE = (
-    0.1  # of the weight of anything but the place of a root that is pulled; larger = gets stuck, smaller = ends far off
-)
+# share of the weight that all but the place of a root has while that is pulled; larger = gets stuck, smaller = ends far
+# from the target
+LOOSE = 0.1
 GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
