@@ -112,7 +112,7 @@ def _sole(figure: Figure, data: pin.Data, roles: Roles, side: str, told: str) ->
     joint, place = own[ankle]
     below = float(np.clip(data.oMi[joint].act(place)[0], back, front))
     hinge = np.array([front, middle, low])
-    joint, place = own.get(f"{side}_toe", (foot, None))
+    joint, place = own.get(f"{side}_toe", (foot, place))
     if joint != foot and len(more := _corners(figure, data, joint)):
         hinge, toes, tip = data.oMi[joint].act(place), joint, float(_flat(more)[:, 0].max())
     rests = np.array([below, middle, hinge[2]])  # as high as the hinge, so that both keep their distance from above
