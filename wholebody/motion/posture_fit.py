@@ -185,23 +185,19 @@ class Fitter:
         edge = self._cone_angles() < STEP
         joints = self._limb_joints[edge], self._base_joints[edge]
         cones = self._state.rows(self._cone_rows[edge], *joints)
-        limits, least = [np.zeros((0, len(lower)))], [np.zeros(0)]
+        contacts, missing = [np.zeros((0, len(lower)))], [np.zeros(0)]
         if near is not None and len(near.distance):
             found = self._workspace.rows.rows(near, CLEARANCE)
-            limits.append(self._state.rows(found.wrench, found.second, found.first))
-            least.append(np.minimum(CLEARANCE - found.gap, PUSH))
-        pulls = [np.ones(sum(map(len, least)))]
+            contacts.append(self._state.rows(found.wrench, found.second, found.first))
+            missing.append(np.minimum(CLEARANCE - found.gap, PUSH))
         for other, share, part, weight in midway:
             self._state.update(pin.interpolate(self.model, q, other, share))
             found = self._workspace.rows.rows(self._workspace.proximity.query(self._state.data, PASSING), SPARE)
-            missing = SPARE - found.gap
-            limits.append((1.0 - share) * self._state.rows(found.wrench, found.second, found.first))
-            least.append(np.minimum(np.where(missing > 0.0, part, 1.0) * missing, PUSH))
-            # what a row is multiplied by, its price is by the square of
-            pulls.append(np.full(len(missing), weight * RELAXED**0.5))
-        among_rows, low, pull = map(np.concatenate, (limits, least, pulls))
-        among_rows *= pull[:, None]
-        low *= pull
+            pull = weight * RELAXED**0.5  # what a row is multiplied by, its price is by the square of
+            way = SPARE - found.gap
+            contacts.append(pull * (1.0 - share) * self._state.rows(found.wrench, found.second, found.first))
+            missing.append(pull * np.minimum(np.where(way > 0.0, part, 1.0) * way, PUSH))
+        among_rows, low = np.concatenate(contacts), np.concatenate(missing)
         if len(low) > len(lower):
             # where there is room, no more rows are active than this; where there is none, hundreds would take seconds
             kept = np.sort(np.argpartition(-low, len(lower))[: len(lower)])
