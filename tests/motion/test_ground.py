@@ -263,6 +263,26 @@ def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -
     assert wb.avoid(clip, scene, hold_feet=False).report.after.free
 
 
+@pytest.mark.parametrize("frozen", ["root", "all"])
+def test_what_is_frozen_inside_things_or_the_body_is_told_before(frozen: str, human: wb.Figure) -> None:
+    """A box comes to a frozen pelvis in frame 1, or a frozen body has an elbow inside its trunk from frame 2 on."""
+    q, scene = np.tile(human.posture("standing"), (4, 1)), wb.Scene(human)
+    if frozen == "root":
+        q[0, 0] -= 1.0
+        at = human.placement(q[1], "pelvis").translation
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name="box", at=at)
+        terms, said = (
+            wb.Freeze("root"),
+            r"pelvis is frozen up to .* mm inside box \(first in frame 1\); leave that Freeze",
+        )
+    else:
+        joint = human.model.joints[human.model.getJointId("left_shoulder_abduction")]
+        q[2:, joint.idx_q] = human.model.lowerPositionLimit[joint.idx_q]
+        terms, said = wb.Freeze(*human.joints), r"left_\w+ is frozen .* inside \w+ \(first in frame 2\)"
+    with pytest.warns(UserWarning, match=said):
+        wb.avoid(wb.Clip(human, q, DT), scene, constraints=[terms], progress=lambda _: True)
+
+
 def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) -> None:
     floor = wb.Scene(human).add(wb.HalfSpace(), name="floor")
     clip = wb.Clip(human, np.tile(human.grounded(human.posture("standing"), floor), (3, 1)), DT)

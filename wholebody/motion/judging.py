@@ -229,31 +229,43 @@ def foreseen(terms: FrameTerms, was: ClipCheck, keep_ends: bool) -> str:
 
 
 def _held(terms: FrameTerms, was: ClipCheck) -> str:
-    """What is held, with what it carries, where it is inside of a thing, so that no method can free it."""
-    figure, model, parts, feet = terms.scene.figure, terms.scene.model, list[str](), False
+    """What is held or frozen, with what it carries, where it is inside of a thing, so that no method can free it."""
+    figure, model, parts, words = terms.scene.figure, terms.scene.model, list[str](), set[str]()
     carrier = {name: each.segment for name, each in terms.scene.objects.items() if each.segment is not None}
     carrier |= {name: name for name in figure.segments}
     stands = [{model.frames[figure.frame_id(name)].parentJoint for name in names} for names in terms.stands]
     still = [term for term in terms.given if isinstance(term, Hold) and term.relative_to is None]
     held = {model.frames[figure.frame_id(term.frame)].parentJoint for term in still}
+    bounds = terms.bounds(0)
+    kept = (bounds.lower == 0.0) & (bounds.upper == 0.0)
+    moving = {j for j in range(1, model.njoints) if not kept[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]].all()}
     for contact in was.contacts:
         part, thing = contact.first, contact.second
         part, thing = (part, thing) if part in carrier else (thing, part)
-        if contact.kind != "thing" or part not in carrier:
+        joints = [
+            model.frames[figure.frame_id(str(carrier[one]))].parentJoint if one in carrier else 0
+            for one in (part, thing)
+        ]
+        between = set(model.supports[joints[0]]) ^ set(model.supports[joints[1]])  # joints that can bring them apart
+        frozen = bool(between) and not between & moving
+        if part not in carrier or (contact.kind != "thing" and not frozen):
             continue
-        joint = model.frames[figure.frame_id(str(carrier[part]))].parentJoint
+        joint = joints[0]
         standing = np.array([joint in here for here in stands])
-        inside = (standing | (joint in held)) & (contact.depth > HELD)
+        inside = (standing | (joint in held or frozen)) & (contact.depth > HELD)
         if inside.any():
-            feet = feet or bool((standing & inside).any())
-            word = "stands" if standing.any() else "is held"
-            parts.append(f"{part} {word} up to {1e3 * contact.depth[inside].max():.0f} mm inside {thing}")
+            word = "stands" if (standing & inside).any() else "is held" if joint in held else "is frozen"
+            words.add(word)
+            first = f"first in frame {int(inside.argmax())}"
+            parts.append(f"{part} {word} up to {1e3 * contact.depth[inside].max():.0f} mm inside {thing} ({first})")
     if not parts:
         return ""
-    mend = (
-        "let feet slide by hold_feet=False, or retarget the recording with this scene, which puts feet on what is below"
-    )
-    return f"{', '.join(parts)}, and is held there; {mend} them" if feet else f"{', '.join(parts)}; leave that Hold out"
+    if "stands" in words:
+        return (
+            f"{', '.join(parts)}, and is held there; let feet slide by hold_feet=False, or retarget the recording with "
+            "this scene, which puts feet on what is below them"
+        )
+    return f"{', '.join(parts)}; leave that {'Hold' if 'is held' in words else 'Freeze'} out"
 
 
 def _jumps(was: ClipCheck) -> str:
