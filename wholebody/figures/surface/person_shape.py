@@ -111,12 +111,14 @@ class PersonShape:
         if part == "clavicle":
             return placed(limb(balls), self.bind[segment])
         if part == "thigh":  # it tapers evenly from the hip's piece to the knee: where the knee's begins, it is deeper
-            radius, knee = 1.06 * self.person.radius("calf"), balls[-1][1]
-            balls[-2] = np.array([radius - knee, 0.0, -0.84 * self.person.length(segment)]), radius
+            radius = 1.06 * self.person.radius("calf")
+            balls[-2] = np.array([radius - self.person.size("seat"), 0.0, -0.84 * self.person.length(segment)]), radius
         child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
         end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
         (_, first), (_, last) = balls[0], balls[-1]
         start, top = (0.95 * first, -0.015) if part == "thigh" else (first, 0.0)
+        if part == "upper_arm":
+            start = min(first, 1.3 * self.person.size("shoulder_top"))
         if part == "shank":
             start = caps(self.solids, f"{side}_thigh")[-1][1]
             del balls[0]  # the bone below the knee, around which there is flesh
@@ -197,9 +199,10 @@ class PersonShape:
     def _trapezius(self, side: str) -> Field:
         """The slope from the side of the neck to the end of the shoulder."""
         scale, sign = self._scale, dict(SIDES)[side]
-        high = self.at("neck", np.array([-0.022, sign * 0.024, 0.028]) * scale)
+        radius = self.person.radius("neck")
+        high = self.at("neck", (-0.4 * radius, 0.4 * sign * radius, 0.016 * scale))
         low = self.at(f"{side}_upper_arm") + np.array([-0.006, -sign * 0.016, 0.004]) * scale
-        return round_cone(high, low, 0.036 * scale, 0.034 * scale)
+        return round_cone(high, low, 0.45 * radius, 0.034 * scale)
 
     def _collar(self, below: float) -> Field:
         """Everything under the shirt's upper edge, or under a plane that many metres below it."""
@@ -278,14 +281,15 @@ class PersonShape:
         shape, frame = head_shape(self.size), self.bind["head"]
         scale = self._scale
         bottom, top = self.at("neck", (0.0, 0.0, -0.04)), self.at("head", (self.size.head_x, 0.0, self.size.head_top))
-        shoulders = union([self._trunk, self._throat, *(self._trapezius(side) for side, _ in SIDES)], 0.035 * scale)
-        shoulders = without(shoulders, self._collar(0.03))
+        shoulders = union([self._trunk, *(self._trapezius(side) for side, _ in SIDES)], 0.035 * scale)
+        shoulders = union([shoulders, self._throat], 0.022)
+        shoulders = without(shoulders, self._collar(0.02))
         skin = union([placed(shape.skin, frame), shoulders], 0.022)
         low, high = bounds([bottom, top], 0.15 * scale)
         low[2], high[2] = bottom[2] - 0.05, top[2] + 0.03
         atlas = self.at("head")
         claims = [
-            *self._claims(["thorax", "neck", *self._sided("clavicle")]),
+            *self._claims([*TRUNK, "neck", *self._sided("clavicle", "upper_arm")]),  # as the shirt's over it
             Claim("head", union([half_space(atlas, (0.0, 0.0, -1.0)), placed(shape.skin, frame)]), 0.012),
         ]
         rigid = [Claim("head", lambda points: np.zeros(len(points)))]
