@@ -110,9 +110,13 @@ class PersonShape:
         balls = caps(self.solids, segment)
         if part == "clavicle":
             return placed(limb(balls), self.bind[segment])
-        if part == "thigh":  # it tapers evenly from the hip's piece to the knee: where the knee's begins, it is deeper
-            radius = 1.06 * self.person.radius("calf")
-            balls[-2] = np.array([radius - self.person.size("seat"), 0.0, -0.84 * self.person.length(segment)]), radius
+        if part == "thigh":
+            # Girth of the lower thigh: 1.06 times the calf's (ANSUR II: 1.04 of men, 1.07 of women). It is put higher
+            # than it is measured, because the seated knee is not to become higher.
+            radius, length = 1.06 * self.person.radius("calf"), self.person.length(segment)
+            (back, _, _), knee = balls[-2]
+            above = np.array([back + radius - knee, 0.0, -0.70 * length])  # the underside is level with the seat
+            balls[-2:-1] = [(above, radius), (np.array([back, 0.0, -0.88 * length]), knee)]
         child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
         end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
         (_, first), (_, last) = balls[0], balls[-1]
