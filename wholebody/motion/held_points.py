@@ -73,7 +73,7 @@ def touching_points(
         elbow, wrist, hand = (f"{role.split('_')[0]}_{part}" for part in ("elbow", "wrist", "hand"))
         carrier = role if role in places else wrist
         joint = placed[carrier][0]
-        if carrier == wrist and hand not in own and wrist not in roles.ends:
+        if carrier == wrist and hand not in own and own[wrist] != own.get(elbow):
             found.append(HeldPoint(role, "", *_end(figure, joint), thing=True, share=share, base=base))
             continue
         place = places[carrier]
