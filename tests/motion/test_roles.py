@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.motion.test_retargeting import person
 from wholebody.motion.roles import matched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.structure import built_figure, upright
@@ -300,3 +301,22 @@ def test_a_part_is_where_the_axes_of_its_joints_meet(tmp_path: Path) -> None:
         for side, sign in (("left", 1), ("right", -1)):
             assert places[f"{side}_{part}"] == pytest.approx([0.0, sign * y, z], abs=1e-6)
     assert found["left_ankle"].joint == "left_6_j"
+
+
+def test_a_small_robot_follows_as_a_large_one(tmp_path: Path) -> None:
+    """Of 15 cm, with bones whose ends miss few metres at any angle."""
+    links = [("base", "torso", (0, 0, 0.045), 0.015, "z")]
+    for side, sign in (("left", 1), ("right", -1)):
+        places = [
+            ("base", "1", (0, 0.015 * sign, -0.015), "y"), ("1", "2", (0, 0, 0), "x"), ("2", "3", (0, 0, -0.015), "z"),
+            ("3", "4", (0, 0, -0.045), "y"), ("4", "5", (0, 0, -0.06), "y"), ("5", "6", (0, 0, 0), "x"),
+            ("torso", "a", (0, 0.03 * sign, 0.03), "y"), ("a", "b", (0, 0, 0), "x"), ("b", "c", (0, 0, -0.015), "z"),
+            ("c", "d", (0, 0, -0.03), "y"), ("d", "e", (0, 0, -0.04), "x"),
+        ]  # fmt: skip
+        for parent, name, at, axis in places:
+            above = parent if len(parent) > 1 else f"{side}_{parent}"
+            links.append((above, f"{side}_{name}", at, 0.007, axis))
+    motion = person(20)
+    clip = wb.retarget(motion, robot(tmp_path, links), ground=None)
+    errors = wb.motion.bone_errors(motion, clip)
+    assert max(np.degrees(np.median(values)) for values in errors.values()) < 0.1

@@ -30,7 +30,7 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.faults import DIP
 from wholebody.motion.holds import Holds
-from wholebody.motion.posture_fit import CLEARANCE, Fitter, Goals, Midway, layout_of, levers
+from wholebody.motion.posture_fit import CLEARANCE, LEAST_LEVER, Fitter, Goals, Midway, layout_of, levers
 from wholebody.motion.retarget_targets import Targets, Wanted, has_trunk, parts_of
 from wholebody.motion.roles import Roles
 from wholebody.motion.structure import upright
@@ -45,7 +45,8 @@ STARTS = 4  # how often the first frame is solved, each time from where soles ca
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
 FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
-STAY = 0.03  # m/rad from the neutral posture, for what no goal determines
+STAY = 0.03  # m/rad from the neutral posture of a person, for what no goal determines
+PERSON = 0.9  # m that a joint of a person moves what it carries at most; bones of smaller figures miss fewer metres
 CHANGE = 0.055  # s^0.5, weight of a change of the deviation in the first pass, over the root of the time step
 BEND = 0.067  # s², weight of an acceleration of the deviation in sweeps, in metres that limbs move
 GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a deviation that nothing needs
@@ -78,7 +79,9 @@ class Run:
         self.hips = [k for k, role in enumerate(points) if role.endswith("hip")] or [0]
         self.led = figure.root == "free" and has_trunk(roles.joints)
         self.upright = upright(figure)
-        self.stay = STAY * figure.neutral_weights
+        self.levers = levers(figure)
+        size = float(self.levers[6 if figure.root == "free" else 0 :].max(initial=LEAST_LEVER))
+        self.stay = STAY * min(size / PERSON, 1.0) * figure.neutral_weights
         if figure.root == "free" and not self.led:
             self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
         limit = np.array(self.model.velocityLimit, dtype=float)
@@ -88,7 +91,6 @@ class Run:
         joints = [one for one in self.model.joints[1:] if one.nq == one.nv == 1 and np.isfinite(self.most[one.idx_v])]
         self.slow: Indices = np.array([one.idx_q for one in joints], dtype=np.intp)
         self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
-        self.levers = levers(figure)
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
         self.span = 2 ** int(max(0.0, np.log2(SPAN / dt)))  # frames between those of the first pass and first sweeps
