@@ -70,3 +70,18 @@ def test_a_half_bone_slides_by_the_cosine() -> None:
         np.testing.assert_allclose(found[:3, 3], place + share * turn @ slide, atol=1e-12)
     about = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 1.0), place).homogeneous  # a turn about the limb moves no flesh
     np.testing.assert_allclose(halfway(np.eye(4), about, slide)[:3, 3], place, atol=1e-12)
+
+
+@pytest.mark.parametrize(("flexion", "abduction"), [(165.0, 15.0), (0.0, 155.0)])
+def test_no_flesh_of_a_raised_arm_hangs_below_the_shoulder(flexion: float, abduction: float) -> None:
+    """Under the joint there is the arm's radius, cloth, and some of the fold of the armpit."""
+    figure = load("human", sex="male")
+    data = figure.model.createData()
+    raised = {"shoulder_flexion": flexion, "shoulder_abduction": abduction, "clavicle_elevation": 25.0}
+    joints = {f"left_{name}": radians(angle) for name, angle in raised.items()}
+    pin.framesForwardKinematics(figure.model, data, figure.with_joints(pin.neutral(figure.model), joints))
+    lowest = np.concatenate(drawn(figure, data)["left_upper_arm"])[:, 2].min()
+    person = figure.describe().person
+    assert person is not None
+    below = data.oMf[figure.frame_id("left_shoulder")].translation[2] - lowest
+    assert below < person.radius("upper_arm") + 0.03
