@@ -154,7 +154,8 @@ def test_goals_out_of_reach_and_wrong_ends_are_told() -> None:
     assert not far.solved
     assert far.message.startswith("no posture meets the goals")
     human = wb.load("human")
-    late = wb.plan(wb.Scene(human), "standing", wb.Point("left_palm", (9.0, 0.0, 0.0)), time_limit=0.1)
+    far_away, feet = wb.Point("left_palm", (9.0, 0.0, 0.0)), [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    late = wb.plan(wb.Scene(human), "standing", far_away, constraints=feet, time_limit=0.1)
     assert late.message.startswith("no posture that meets the goals was found within the time limit")
     beyond = np.array(end)
     beyond[0] = scene.figure.limits.upper[0] + 0.1
