@@ -260,8 +260,11 @@ class _Search:
                 with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
                     best = tighten(model, best, self._local, self._slides)
             return best, f"the shortest of {runs} searches"
-        if not self._reached and BUDGET.spent < SEARCHED:
-            return None, f"no posture meets the goals: {self._said}"
+        if not self._reached:
+            none = (
+                "meets the goals" if BUDGET.spent < SEARCHED else "that meets the goals was found within the time limit"
+            )
+            return None, f"no posture {none}: {self._said}"
         return None, "no motion was found within the time limit"
 
     def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
@@ -344,14 +347,14 @@ class _Judge:
         self.problem, self._pace = problem, pace
         began = _computed()
         assess(problem, problem.start)
-        self._frame = 2.0 * (_computed() - began)  # s: each is also swept from the one before
+        self._frame = 3.0 * (_computed() - began)  # s: each is also swept from the one before
 
     def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
         figure = self.problem.scene.figure
         steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
         fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
-        return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.2 * fastest) / self._pace.dt, 1e-9))
+        return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.6 * fastest) / self._pace.dt, 1e-9))
 
     def judged(self, path: Array) -> Plan:
         """The motion along a path (m, nq) as fast as it may be, and what it is worth."""
