@@ -63,8 +63,8 @@ class RestingHands(Checked):
         found = [f"{body}{palm}" for body in figure.bodies for palm in PALMS if f"{body}{palm}" in figure.frames]
         if not found and len(figure.bodies) == 1 and figure.root == "free":
             roles = figure_roles(figure)
-            ends = ([f"{side}_hand", f"{side}_wrist"] for side in ("left", "right"))
-            found = [name for end in ends for name in [roles[role] for role in end if role in roles][:1]]
+            choices = ([f"{side}_hand", f"{side}_wrist"] for side in ("left", "right"))
+            found = [name for choice in choices for name in [roles[role] for role in choice if role in roles][:1]]
         taken = {_joint(scene, name) for name in found}
         bearing = {piece.parentJoint for piece in figure.geometry.geometryObjects}
         for thing in scene.objects.values():
