@@ -176,3 +176,11 @@ def test_a_bar_keeps_its_place_in_the_second_of_two_arms() -> None:
     assert hold.orientation
     mine = frame_terms(scene, q, DT, [RestingHands(), wb.Hold("right/grip", relative_to="left/grip")])
     assert not any(mine.hands)  # a hand that is held by a given term is left to it
+
+
+@pytest.mark.parametrize("worn", ["pack", "pouches"])
+def test_what_equipment_rests_on_is_no_hand(human: Figure, worn: str) -> None:
+    scene = wb.Scene(human)
+    for piece in wb.motion.equipment(worn, human):
+        piece.attach(scene)
+    assert RestingHands().names(scene) == ("left_palm", "right_palm")

@@ -37,7 +37,7 @@ class RestingHands(Checked):
 
     Attributes:
         hands: palms or segments; None for the figure's palms, the hands of a robot by its structure, and last segments
-            of arms that a carried thing rests on. [] holds none.
+            of others that a carried thing rests on. [] holds none.
 
     Raises:
         InputError: hands are no list of names.
@@ -65,11 +65,14 @@ class RestingHands(Checked):
             roles = figure_roles(figure)
             choices = ([f"{side}_hand", f"{side}_wrist"] for side in ("left", "right"))
             found = [name for choice in choices for name in [roles[role] for role in choice if role in roles][:1]]
-        taken = {_joint(scene, name) for name in found}
+        hands = {_joint(scene, name) for name in found}
+        # of a figure with hands nothing else holds things: a pack rests on the neck
+        armed = {joint for joints in figure.bodies.values() if hands & set(joints) for joint in joints}
+        taken = set[int]()
         bearing = {piece.parentJoint for piece in figure.geometry.geometryObjects}
         for thing in scene.objects.values():
             ends = {_joint(scene, name): name for name in reversed(thing.rests_on) if name in figure.segments}
-            for joint in sorted(ends.keys() - {0}):  # the palm of a gripper before its fingers
+            for joint in sorted(ends.keys() - {0} - armed):  # the palm of a gripper before its fingers
                 if (_after(figure, joint) & bearing) <= ends.keys() and not taken & set(figure.model.supports[joint]):
                     taken.add(joint)
                     found.append(ends[joint])
