@@ -829,6 +829,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "MotionBounds", Call(wb.motion.MotionBounds, {"jerk": 2.0, "speed": 1.5, "deviation": 0.5, "keep_ends": True})
     yield "StanceFeet", Call(wb.motion.StanceFeet, stance, lambda made: made.names(arm))
     yield "StanceFeet.names", Call(wb.motion.StanceFeet(["link1"]).names, {"figure": arm})
+    yield "RestingHands", Call(wb.motion.RestingHands, {"hands": ["link1"]}, lambda made: made.names(wb.Scene(arm)))
+    yield "RestingHands.names", Call(wb.motion.RestingHands(["link1"]).names, {"scene": wb.Scene(arm)})
     yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):

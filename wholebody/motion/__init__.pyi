@@ -7,6 +7,7 @@ from wholebody.motion.judging import AvoidanceReport as AvoidanceReport, Avoided
 from wholebody.motion.measures import MotionBounds as MotionBounds
 from wholebody.motion.posing import posed as posed
 from wholebody.motion.reading import read_skeleton as read_skeleton
+from wholebody.motion.resting_hands import RestingHands as RestingHands
 from wholebody.motion.retargeting import bone_errors as bone_errors
 from wholebody.motion.skeleton import SkeletonMotion as SkeletonMotion
 from wholebody.motion.stance import StanceFeet as StanceFeet

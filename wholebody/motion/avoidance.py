@@ -29,6 +29,7 @@ from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, foreseen, judged
 from wholebody.motion.load_change import LoadChange
 from wholebody.motion.measures import MotionBounds, resolved
+from wholebody.motion.resting_hands import RestingHands
 from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
@@ -76,7 +77,8 @@ def avoid(
         scene: its figure with carried things, and the things around; None for the figure alone.
         method: "trajectory", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
-            its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
+            its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has. Hands that
+            rest are held, as `wb.motion.RestingHands()` does, unless it has one of its own, or a `Hold` of the hand.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless
             `constraints` has a `wb.motion.StanceFeet` of its own; False lets them slide.
         dynamics: keep the torques of joints within strength (the median of the person's sex and age if True; effort
@@ -87,8 +89,8 @@ def avoid(
         keep_ends: keep the first and the last posture as they are where they are free.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
 
-    What must give way is warned of before anything is computed: feet held inside things, a recording that jumps where
-    it collides, and ends that are to be kept but overlap.
+    What must give way is warned of before anything is computed: feet held and hands that rest inside things, a
+    recording that jumps where it collides, and ends that are to be kept but overlap.
 
     Returns:
         The new clip and a report. A clip that could not be freed is an answer too: `report.solved` is False, and
@@ -123,6 +125,8 @@ def avoid(
     given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
     if flag(hold_feet, "avoid: hold_feet") and not any(isinstance(term, StanceFeet) for term in given):
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
+    if not any(isinstance(term, RestingHands) for term in given):
+        given = (*given, RestingHands())
     flag(keep_ends, "avoid: keep_ends")
     judge = _Judge(clip, scene, chosen, given, keep_ends)
     if judge.foreseen:

@@ -19,6 +19,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.motion.grips import grip_shifts
 from wholebody.motion.measures import MotionBounds
+from wholebody.motion.resting_hands import RestingHands, resting_hands
 from wholebody.motion.stance import StanceFeet, held_feet, shifts, standing
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
@@ -26,7 +27,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows
 
 HeldTerm = Constraint | Goal
-Given = Constraint | Goal | Bound | StanceFeet | MotionBounds
+Given = Constraint | Goal | Bound | StanceFeet | RestingHands | MotionBounds
 
 
 class Miss(NamedTuple):
@@ -54,7 +55,7 @@ class FrameTerms:
     scene: Scene  # figure and things
     q: Array  # (n, nq) original postures
     dt: float  # seconds from frame to frame
-    # the terms as they were given, without `StanceFeet` and `MotionBounds`
+    # the terms as they were given, without `StanceFeet`, `RestingHands` and `MotionBounds`
     given: tuple[Constraint | Goal | Bound, ...]
     stands: tuple[tuple[str, ...], ...]  # for each frame, frames of the feet that stand there and are held
     # for each frame, by how much each of them is held beside where it was (3,), metres
@@ -62,6 +63,8 @@ class FrameTerms:
     # for the numbers of given terms that hold a frame at another one, in each frame the shift of the grip (n, 3) beside
     # where it was, metres, in the axes of the other one; without those that are not shifted
     grips: Mapping[int, Array] = field(default_factory=dict)
+    hands: tuple[tuple[Hold, ...], ...] = ()  # for each frame, what holds the hands that rest there; () for none in any
+    sunk: str = ""  # which hands rest too deep inside of what to be held; or ""
     largest: Array | None = None  # (n,) largest deviation of each frame, radians and metres; inf for any
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
     _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
@@ -95,9 +98,11 @@ class FrameTerms:
         return max((float(np.linalg.norm(shift, axis=1).max()) for shift in self.grips.values()), default=0.0)
 
     def feet(self, frame: int) -> tuple[Hold, ...]:
-        """What holds the feet that stand in a frame, where each of them is held."""
+        """What holds the feet that stand in a frame, where each of them is held, and the hands that rest."""
         if frame not in self._feet:
-            found, figure = [], self.scene.figure
+            hands = self.hands[frame] if self.hands else ()
+            found = [replace(hand, at=hand.resolve(self.scene, self.q[frame]).kept_at) for hand in hands]
+            figure = self.scene.figure
             state = self._state.update(self.q[frame]) if self.stands[frame] else self._state
             for foot in held_feet(figure, self.stands[frame]):
                 at = state.frame(figure.frame_id(foot.frame))
@@ -166,9 +171,10 @@ class FrameTerms:
             number: np.stack([np.interp(places, frames, axis) for axis in shift.T], axis=1)
             for number, shift in self.grips.items()
         }
+        hands = tuple(self.hands[frame] for frame in nearest) if self.hands else ()
         q = between(self.scene.model, self.q, places)
         largest = None if self.largest is None else self.largest[nearest]
-        return replace(self, q=q, stands=stands, shifts=shifts, grips=grips, largest=largest)
+        return replace(self, q=q, stands=stands, shifts=shifts, grips=grips, hands=hands, largest=largest)
 
     def missed(self, frame: int, state: State) -> float:
         """By how much the state, of the posture of a frame, misses what is held there, metres and radians."""
@@ -198,7 +204,7 @@ class FrameTerms:
     @property
     def holds(self) -> bool:
         """Whether something is held."""
-        return any(not isinstance(term, Bound) for term in self.given) or any(map(bool, self.stands))
+        return any(not isinstance(term, Bound) for term in self.given) or any(map(bool, (*self.stands, *self.hands)))
 
 
 def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given], clearance: float = 0.0) -> FrameTerms:
@@ -206,11 +212,14 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
     given: list[Any] = listed(constraints, "avoid: constraints", "[wb.Freeze('root')]")
     feet: list[list[str]] = [[] for _ in q]
     largest: Array | None = None
+    rest = RestingHands([])
     for number, term in enumerate(given):
         if isinstance(term, StanceFeet):
             for foot, stand in standing(scene.figure, q, dt, term).items():
                 for frame in np.flatnonzero(stand):
                     feet[frame].append(foot)
+        elif isinstance(term, RestingHands):
+            rest = term
         elif isinstance(term, MotionBounds):
             largest = term.largest
         elif isinstance(term, (Constraint, Goal)):
@@ -224,7 +233,7 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
                 f"avoid: constraints[{number}] is {a(type(term))}, not a constraint; see wholebody.tasks, or give "
                 "wb.motion.StanceFeet()"
             )
-    plain = tuple(term for term in given if not isinstance(term, (StanceFeet, MotionBounds)))
+    plain = tuple(term for term in given if not isinstance(term, (StanceFeet, RestingHands, MotionBounds)))
     stands = tuple(map(tuple, feet))
     found = {
         number: grip_shifts(scene, q, dt, term, clearance)
@@ -232,7 +241,13 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
         if isinstance(term, Hold) and term.at is None and term.relative_to is not None
     }
     grips = {number: shift for number, shift in found.items() if shift.any()}
-    return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips, largest)
+    # a hand that a given term holds is left to it
+    held = [scene.frame_id(term.frame) for term in plain if isinstance(term, Hold)]
+    taken = {scene.model.frames[number].parentJoint for number in held}
+    joints = {name: scene.model.frames[scene.frame_id(name)].parentJoint for name in rest.names(scene)}
+    hands, sunk = resting_hands(scene, q, dt, [name for name, joint in joints.items() if joint not in taken])
+    beside = shifts(scene.figure, q, stands)
+    return FrameTerms(scene, q, dt, plain, stands, beside, grips, tuple(hands), sunk, largest)
 
 
 def _miss(term: HeldTerm, state: State) -> float:

@@ -225,7 +225,9 @@ JUMP = 0.35  # rad, m: least change of a coordinate from frame to frame that can
 
 def foreseen(terms: FrameTerms, was: ClipCheck, keep_ends: bool) -> str:
     """Sentences with their mends: what is held inside things, jumps that collide, ends that cannot be kept; or ""."""
-    return "; ".join(said for said in (_held(terms, was), _jumps(was), _ends(was) if keep_ends else "") if said)
+    return "; ".join(
+        said for said in (_held(terms, was), terms.sunk, _jumps(was), _ends(was) if keep_ends else "") if said
+    )
 
 
 def _held(terms: FrameTerms, was: ClipCheck) -> str:
