@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.scene.workspace import Workspace
@@ -18,13 +18,13 @@ DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows
 DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collision
 
 
-def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[int]]:
-    """Gaps that dip, however thin the things in their way, and the numbers of their pairs, the deepest first."""
-    found = dict[int, list[int]]()
+def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, Depths]:
+    """Gaps that dip, however thin the things in their way, and of each the pairs that do, the deepest first."""
+    found = dict[int, Depths]()
     for gap, passing in _swept(workspace, q, gaps):
-        if passing.depth.max(initial=0.0) > DIP:
-            deepest_first = np.argsort(-passing.depth, kind="stable")
-            found[gap] = [int(passing.number[place]) for place in deepest_first if passing.depth[place] > DIP]
+        order = np.argsort(-passing.depth, kind="stable")
+        if len(order := order[passing.depth[order] > DIP]):
+            found[gap] = Depths(passing.number[order], passing.depth[order])
     return found
 
 
@@ -48,13 +48,12 @@ def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
     return depths_between(workspace, np.stack([before, after]), [0])[0]
 
 
-def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
-    """Gaps that dip, and the shares of each at which its pairs are deepest; nearly the same share is listed once."""
-    found = dipping(workspace, q, gaps)
-    return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:6]) for gap, numbers in found.items()}
+def deepest_shares(workspace: Workspace, q: Array, found: Mapping[int, Depths]) -> dict[int, list[float]]:
+    """Shares of each gap of `dipping` at which its pairs are deepest; nearly the same share is listed once."""
+    return {gap: _deepest(workspace, q[gap], q[gap + 1], pairs.number[:6]) for gap, pairs in found.items()}
 
 
-def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
+def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Indices) -> list[float]:
     """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers."""
     # A corner dips in a hundredth of a gap: between the nearest of many places golden sections look.
     model, data = workspace.model, workspace.model.createData()

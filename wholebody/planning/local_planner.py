@@ -206,7 +206,6 @@ class TrackedMotions:
         self._held = holds(problem)
         self.shares = np.ones(self._model.nv) if self._held else self.geodesics.shares
         self._attraction = Attraction(problem.start, self.shares**2)
-        self._factors = np.ones(self._model.nv)  # on the shares by which a target counts
         self._loose = np.full(self._model.nv, LOOSE)
         for root in problem.scene.figure.roots.values():
             place = self._model.joints[root].idx_v
@@ -241,29 +240,29 @@ class TrackedMotions:
 
     def towards(self, q: Array, target: Array, most: float = np.inf) -> tuple[list[Array], bool]:
         """See `Geodesics`; ends where the motion is longer than `most`, radians and metres."""
-        way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target)
-        self._attraction.toward(target)
-        if self._held:
-            self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
-        while left > REACHED:
-            here, before, q = q, rest, self._tracker.step(q).q
-            left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target)
-            if (rest > before - GAIN and left > REACHED) or gone + left > most or BUDGET.over:
-                return way, False
-            way.append(q)
-        return way, True
+        return self._approached(q, target, np.ones(self._model.nv), most)
 
     def pulled(self, q: Array, target: Array) -> list[Array]:
         """Postures (nq,) of a motion from q that pulls free roots to their places in a target (nq,), without q.
 
         All else gives way to what is around it, as a hand that is drawn out of a box does.
         """
-        usual, self._factors = self._factors, self._loose
-        self._attraction.weigh(self._loose**2)
-        way, _ = self.towards(q, target)
-        self._factors = usual
-        self._attraction.weigh(usual**2)
-        return way
+        return self._approached(q, target, self._loose, np.inf)[0]
+
+    def _approached(self, q: Array, target: Array, factors: Array, most: float) -> tuple[list[Array], bool]:
+        """The motion of `towards` where the shares of freedoms are multiplied by factors (nv,)."""
+        way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target, factors)
+        self._attraction.weigh(factors**2)
+        self._attraction.toward(target)
+        if self._held:
+            self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
+        while left > REACHED:
+            here, before, q = q, rest, self._tracker.step(q).q
+            left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target, factors)
+            if (rest > before - GAIN and left > REACHED) or gone + left > most or BUDGET.over:
+                return way, False
+            way.append(q)
+        return way, True
 
     def step(self, q: Array, target: Array) -> Array:
         """The posture (nq,) of one step from q towards a target, in which all freedoms count alike, as in lengths."""
@@ -289,8 +288,8 @@ class TrackedMotions:
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))
 
-    def _rest(self, q: Array, target: Array) -> float:
-        return float(np.linalg.norm(self._factors * self.shares * pin.difference(self._model, q, target)))
+    def _rest(self, q: Array, target: Array, factors: Array) -> float:
+        return float(np.linalg.norm(factors * self.shares * pin.difference(self._model, q, target)))
 
 
 LocalPlanner: TypeAlias = Geodesics | TrackedMotions

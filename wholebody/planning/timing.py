@@ -19,6 +19,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
+from wholebody.motion.trajectory.retiming import passed
 from wholebody.planning.smoothing import places
 
 UNLIMITED = 1e9  # rad/s, m/s: no limit; that of a free root is the largest number
@@ -64,18 +65,11 @@ class Timing:
         self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))
         limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
         self._b = squared_rates(self._spline(knots, 1), self._spline(knots, 2), *limits)
-        self._rate = np.sqrt(self._b)
-        self._at = np.concatenate([[0.0], np.cumsum(2.0 / (self._rate[:-1] + self._rate[1:]))])
 
     def frames(self, slower: float) -> Array:
         """Postures (frames, nq), `pace.dt` apart, all of it so many times as slow as the limits let it be."""
-        model, path, rate, at = self._figure.model, self._path, self._rate, self._at
-        count = max(1, int(np.ceil(slower * at[-1] / self._pace.dt - 1e-9)))
-        times = np.linspace(0.0, at[-1], count + 1)
-        gap = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(rate) - 2)
-        since = times - at[gap]
-        share = np.clip(rate[gap] * since + 0.25 * (self._b[gap + 1] - self._b[gap]) * since**2, 0.0, 1.0)
-        between = self._spline(gap + share)[1:-1]
+        model, path = self._figure.model, self._path
+        between = self._spline(passed(self._b, self._pace.dt / slower)[0])[1:-1]
         found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 

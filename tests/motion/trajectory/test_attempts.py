@@ -11,7 +11,7 @@ import pytest
 import wholebody as wb
 from tests.freeing import begun
 from wholebody.figures.figure import Figure
-from wholebody.motion.faults import dips
+from wholebody.motion.faults import deepest_shares, dipping
 from wholebody.motion.one_side import followed
 from wholebody.motion.trajectory import method as trajectory
 from wholebody.motion.trajectory import window_run
@@ -30,7 +30,8 @@ def among_needles(planar_arm: Callable[..., Figure], shares: list[tuple[float, f
         at = (reach * np.cos(0.4 * share), reach * np.sin(0.4 * share), 0.0)
         scene.add(wb.Sphere(0.002), name=f"needle {number}", at=at)
     with scene.borrow() as workspace:
-        return dips(workspace, np.array([[0.0, 0.0], [0.4, 0.0]]), [0])
+        q = np.array([[0.0, 0.0], [0.4, 0.0]])
+        return deepest_shares(workspace, q, dipping(workspace, q, [0]))
 
 
 def test_each_needle_passed_in_a_gap_is_told_where_the_arm_meets_it(planar_arm: Callable[..., Figure]) -> None:

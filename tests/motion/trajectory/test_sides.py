@@ -11,6 +11,7 @@ import pytest
 import wholebody as wb
 from tests.freeing import begun
 from wholebody.figures.figure import Figure
+from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.trajectory import window_run
 from wholebody.motion.trajectory.sqp import SQPResult, WindowProgram
 from wholebody.motion.trajectory.window_run import ClipRun
@@ -61,8 +62,10 @@ def test_what_passes_a_thing_by_more_than_a_step_asks_for_waits_for_other_starts
         return found
 
     monkeypatch.setattr(WindowProgram, "run", told)
-    monkeypatch.setattr(window_run, "depths_between", lambda *given: {0: said.pop() if said else 0.0})
-    monkeypatch.setattr(window_run, "dips", lambda *given: {0: [0.5]})
+    pair = np.zeros(1, dtype=np.intp)
+    dipping = lambda *given: {0: Depths(pair, np.array([said.pop()]))} if said else {}  # noqa: E731
+    monkeypatch.setattr(window_run, "dipping", dipping)
+    monkeypatch.setattr(window_run, "deepest_shares", lambda *given: {0: [0.5]})
     freed = wb.avoid(clip, scene, method=wb.motion.Trajectory(time=0.1))
     assert freed.report.solved, freed.report.message
     assert any(x is ended[0] for x in begins[1:]) is not ends

@@ -99,17 +99,23 @@ def timing(b: Array, dt: float) -> Timing | None:
     """
     if len(b) < 2 or (b >= 1.0 - 1e-3).all():  # it is slowed by next to nothing
         return None
+    s, longer = passed(b, 1.0)
+    return Timing(s * dt, float(longer / np.sqrt(b).min()))
+
+
+def passed(b: Array, step: float) -> tuple[Array, float]:
+    """Places s (m,) from 0 to n - 1 at equal times, of squares of the rate ds/dt at whole s (n,), linear in between.
+
+    Times are `step` apart, or less for the last one to be at the end: also returns step / this difference.
+    """
     rate = np.sqrt(b)
-    took = 2.0 * dt / (rate[:-1] + rate[1:])
-    begun = np.concatenate([[0.0], np.cumsum(took)])
-    frames = int(np.ceil(begun[-1] / dt - 1e-9))
-    at = np.linspace(0.0, begun[-1], frames + 1)
-    gap = np.clip(np.searchsorted(begun, at, side="right") - 1, 0, len(took) - 1)
+    begun = np.concatenate([[0.0], np.cumsum(2.0 / (rate[:-1] + rate[1:]))])
+    count = max(1, int(np.ceil(begun[-1] / step - 1e-9)))
+    at = np.linspace(0.0, begun[-1], count + 1)
+    gap = np.clip(np.searchsorted(begun, at, side="right") - 1, 0, len(b) - 2)
     since = at - begun[gap]
-    speeding = 0.5 * (b[gap + 1] - b[gap]) / dt
-    times = gap * dt + rate[gap] * since + 0.5 * speeding * since**2
-    longer = frames * dt / begun[-1]
-    return Timing(np.clip(times, 0.0, (len(b) - 1) * dt), float(longer / rate.min()))
+    ahead = rate[gap] * since + 0.25 * (b[gap + 1] - b[gap]) * since**2
+    return gap + np.clip(ahead, 0.0, 1.0), float(count * step / begun[-1])
 
 
 def allowance(frames: int, stretch: float) -> float:

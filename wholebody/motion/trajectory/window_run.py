@@ -8,7 +8,7 @@ on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -17,9 +17,10 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.avoider import Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import DIP, Faults, depths_between, dips
+from wholebody.motion.faults import Faults, deepest_shares, dipping
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
@@ -144,8 +145,8 @@ class ClipRun:
             starts = ((_Attempt(x), _Way(early=True)) for x in begins)
         else:
             x = own.deviations(begun[window.first : window.end])
-            dipping = tuple(self._places(own, x, own.moved(x)))
-            starts = [(_Attempt(x, between=dipping), _Way(self._near, self._near))]
+            between = tuple(self._places(own, x, self._dipping(own, x)))
+            starts = [(_Attempt(x, between=between), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         for start, way in chain(starts, ((start, _Way()) for start in _promising(ended_early))):
@@ -265,26 +266,26 @@ class ClipRun:
             x, radius = found.x, NEARLY
             if found.end is End.EARLY:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
-            dipping = self._dipping(own, x)
-            if way.early and max(dipping.values(), default=0.0) > ONE_STEP:  # other starts are beside what it passes
-                return _Attempt(x, found.worst, len(dipping), found.objective, True, program.between)
+            dips = self._dipping(own, x)
+            deepest = max((float(pairs.depth[0]) for pairs in dips.values()), default=0.0)
+            if way.early and deepest > ONE_STEP:  # other starts are beside what it passes
+                return _Attempt(x, found.worst, len(dips), found.objective, True, program.between)
             if not found.met:
                 break
             before = len(program.nodes)
-            program.add(self._places(own, x, dipping))
+            program.add(self._places(own, x, dips))
             if len(program.nodes) == before:
                 break
-        return _Attempt(x, found.worst, len(dipping), found.objective, between=program.between)
+        return _Attempt(x, found.worst, len(dips), found.objective, between=program.between)
 
-    def _dipping(self, own: _Window, x: Array) -> dict[int, float]:
-        """Gaps of deviations x (n, nv) whose motions dip, and how deep [m]."""
-        depths = depths_between(self._run.workspace, own.chart.postures(x), own.moved(x))
-        return {gap: depth for gap, depth in depths.items() if depth > DIP}
+    def _dipping(self, own: _Window, x: Array) -> dict[int, Depths]:
+        """Gaps of deviations x (n, nv) whose motions dip, and their pairs."""
+        return dipping(self._run.workspace, own.chart.postures(x), own.moved(x))
 
-    def _places(self, own: _Window, x: Array, gaps: Iterable[int]) -> list[Node]:
-        """Places in gaps of deviations x (n, nv) where motions dip, and beside these."""
-        found = dips(self._run.workspace, own.chart.postures(x), gaps)
-        places = [(gap, at + side) for gap, shares in found.items() for at in shares for side in (0.0, -0.005, 0.005)]
+    def _places(self, own: _Window, x: Array, found: Mapping[int, Depths]) -> list[Node]:
+        """Places in the gaps of deviations x (n, nv) that dip at which they are deepest, and beside these."""
+        shares = deepest_shares(self._run.workspace, own.chart.postures(x), found)
+        places = [(gap, at + side) for gap, each in shares.items() for at in each for side in (0.0, -0.005, 0.005)]
         return [Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in places]
 
 
