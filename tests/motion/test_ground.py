@@ -237,6 +237,21 @@ def test_frames_without_room_are_told_and_their_programs_stay_small(
     assert max(rows) < len(low.geometry.collisionPairs)
 
 
+def test_programs_of_many_pieces_without_room_stay_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its 39 spheres are all inside the floor or the ceiling: a program of their hundreds of rows took a second."""
+    person = wb.load("human", detail="spheres")
+    low = wb.Scene(person).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 1.0))
+    rows, solve = list[int](), posture_fit.daqp.solve
+
+    def counted(*program: Any, **settings: Any) -> Any:
+        rows.append(len(program[2]))
+        return solve(*program, **settings)
+
+    monkeypatch.setattr(posture_fit.daqp, "solve", counted)
+    wb.retarget(walker(flat, 0.1)[0], person, low)
+    assert max(rows) <= person.model.nv + len(person.cones)
+
+
 def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -> None:
     standing = human.grounded(human.posture("standing"), wb.Scene(human).add(wb.HalfSpace(), name="floor"))
     sunk = standing.copy()

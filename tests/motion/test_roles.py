@@ -201,7 +201,7 @@ def test_a_small_robot_with_a_stiff_trunk_is_known_by_its_axes(ahead: int, tmp_p
         links += [(f"{side}_2_R", f"{side}_3", (0, 0, -0.15), 0.3, "y")]
     figure = robot(tmp_path, links)
     found = matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None)
-    numbers = dict(zip(LEGS, ("LEG_2", "LEG_4", "LEG_6_R", "ARM_2_R", "ARM_3", "ARM_3"), strict=True))
+    numbers = dict(zip(LEGS, ("LEG_3_R", "LEG_4", "LEG_6_R", "ARM_2_R", "ARM_3", "ARM_3"), strict=True))
     assert found.frames == {"pelvis": "base"} | {f"left_{part}": f"L{joint}_j" for part, joint in numbers.items()}
     joint, place = found.places(figure)["left_wrist"]
     assert figure.model.names[joint] == "LARM_3_j"
@@ -228,7 +228,7 @@ def test_a_robot_of_legs_alone_is_known_where_it_walks(tmp_path: Path) -> None:
         known = {
             f"{side}_{part}": f"L{side[0].upper()}_{k}_j" for side in ("left", "right") for part, k in legs.items()
         }
-        assert built_figure(figure) == (known if down < 0.0 else {})
+        assert {role: part.joint for role, part in built_figure(figure).items()} == (known if down < 0.0 else {})
         assert built_figure(wb.load(tmp_path / "robot.urdf")) == {}
         if down < 0.0:
             q, found = upright(figure), matched(still(tuple(KNOWN["SMPL-X"].split())), figure, None)
@@ -265,3 +265,38 @@ def test_a_figure_with_one_freedom_is_refused() -> None:
     figure = wb.figures.adjustable({"a": wb.Box((1, 1, 1))}, height=(0, 1))
     with pytest.raises(wb.InputError, match="no bones of the skeleton are known"):
         wb.retarget(still(tuple(KNOWN["SMPL-X"].split())), figure)
+
+
+def test_a_part_is_where_the_axes_of_its_joints_meet(tmp_path: Path) -> None:
+    """Joints stand 3 cm beside where their axes meet, as of a HighTorque Hi, and toes turn in front of ankles."""
+    links = [("base", "torso", (0, 0, 0.3), 0.1, "z")]
+    for side, sign in (("left", 1), ("right", -1)):
+        links += [
+            ("base", f"{side}_1", (0, 0.06 * sign, -0.1), 0.02, "y"),
+            (f"{side}_1", f"{side}_2", (0.03, 0.04 * sign, 0), 0.02, "x"),
+            (f"{side}_2", f"{side}_3", (-0.03, 0, -0.12), 0.02, "z"),
+            (f"{side}_3", f"{side}_4", (0, 0.03 * sign, -0.18), 0.02, "y"),
+            (f"{side}_4", f"{side}_5", (0, -0.03 * sign, -0.3), 0.02, "y"),
+            (f"{side}_5", f"{side}_6", (0.02, 0, 0), 0.02, "x"),
+            (f"{side}_6", f"{side}_7", (0.08, 0, -0.02), 0.02, "y"),
+            ("torso", f"{side}_a", (0, 0.1 * sign, 0.1), 0.02, "y"),
+            (f"{side}_a", f"{side}_b", (0.03, 0.05 * sign, 0), 0.02, "x"),
+            (f"{side}_b", f"{side}_c", (-0.03, 0, -0.2), 0.02, "z"),
+            (f"{side}_c", f"{side}_d", (0, 0.02 * sign, -0.05), 0.02, "y"),
+            (f"{side}_d", f"{side}_e", (0, -0.02 * sign, -0.2), 0.02, "z"),
+            (f"{side}_e", f"{side}_f", (0, 0, -0.03), 0.02, "x"),
+        ]
+    figure = robot(tmp_path, links)
+    found = built_figure(figure)
+    places = {role: figure.placement(upright(figure), part.joint).act(part.place) for role, part in found.items()}
+    known = {
+        "hip": (0.1, -0.1),
+        "knee": (0.1, -0.4),
+        "ankle": (0.1, -0.7),
+        "shoulder": (0.15, 0.4),
+        "elbow": (0.15, 0.15),
+    }
+    for part, (y, z) in known.items():
+        for side, sign in (("left", 1), ("right", -1)):
+            assert places[f"{side}_{part}"] == pytest.approx([0.0, sign * y, z], abs=1e-6)
+    assert found["left_ankle"].joint == "left_6_j"

@@ -265,3 +265,16 @@ def test_a_deep_squat_needs_more_of_the_knees_than_standing(human: wb.Figure) ->
     assert bent.largest()["left_knee_flexion"] > straight.largest()["left_knee_flexion"] + 20.0
     knee = human.model.joints[human.joint_id("left_knee_flexion")].idx_v
     assert bent.torque[1, knee] < 0.0  # the extensors work
+
+
+@pytest.mark.parametrize(("speed", "height", "bears"), [(0.3, 0.004, True), (1.5, 0.004, False), (0.3, 0.06, False)])
+def test_a_foot_bears_while_it_comes_down_and_leaves(speed: float, height: float, bears: bool) -> None:
+    """It stands, and for half a second goes on with its feet as near to the ground as in a double support."""
+    figure = wb.load("human")
+    still = np.tile(figure.posture("standing"), (60, 1))
+    along = np.clip(np.arange(60) - 25, 0, 15)
+    still[:, 0] += speed / 30.0 * along
+    still[26:40, 2] += height
+    needed = wb.motion.torques(wb.Clip(figure, still, 1.0 / 30.0), cutoff=None)
+    assert needed.supported[28:38].all() == bears
+    assert needed.supported[28:38].any() == bears

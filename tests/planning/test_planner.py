@@ -19,7 +19,7 @@ from wholebody.planning import Pace, Plan
 from wholebody.planning.local_planner import TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
-from wholebody.planning.smoothing import length, shortcut
+from wholebody.planning.smoothing import length, shortcut, tighten
 
 
 def shelf(number: int) -> tuple[wb.Problem, Array]:
@@ -106,6 +106,29 @@ def test_a_joint_that_turns_back_on_the_way_moves_evenly_though_no_two_postures_
     assert length(model, path) > 3.0 * straight
     assert length(model, found) < 1.1 * straight
     np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
+
+
+def test_a_path_round_a_ball_is_drawn_tight(
+    free_bodies: Callable[..., wb.Figure], least_distance: Distance
+) -> None:
+    """The shortest one consists of two tangents and an arc, along which nothing turns."""
+    figure, far, around = free_bodies(wb.Sphere(0.1)), 1.0, 0.4
+    scene = wb.Scene(figure).add(wb.Sphere(around - 0.1), name="ball")
+    rng, path = np.random.default_rng(0), []
+    for share in np.linspace(0.0, np.pi, 13):
+        q = figure.neutral.copy()
+        q[:3] = -far * np.cos(share), 0.0, 1.3 * np.sin(share)
+        turned = np.asarray(pin.integrate(figure.model, q, np.hstack([np.zeros(3), rng.normal(0.0, 0.3, 3)])))
+        path.append(turned if 0.0 < share < np.pi else q)
+    problem = wb.Problem(scene, path[0])
+    with problem.borrow() as workspace:
+        slides = TrackedMotions(problem, workspace)
+        found = tighten(figure.model, path, slides.geodesics, slides)
+    shortest = 2.0 * np.sqrt(far**2 - around**2) + around * (np.pi - 2.0 * np.arccos(around / far))
+    assert length(figure.model, path) > 1.5 * shortest
+    assert shortest <= length(figure.model, found) < 1.04 * shortest
+    np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
+    assert least_along(scene, np.array(found), least_distance) >= 0.0
 
 
 def test_the_same_seed_plans_the_same_motion() -> None:

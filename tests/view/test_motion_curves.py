@@ -74,6 +74,17 @@ def test_a_click_brings_the_film_there(browser: Any, page: str, tmp_path: Path) 
     assert browser.evaluate(f"{INSIDE}.viewer.animator.actions[0].time") == pytest.approx(0.5 * 11 / 30, abs=1e-3)
 
 
+def test_charts_follow_the_film(browser: Any, page: str, tmp_path: Path) -> None:
+    file = tmp_path / "page.html"
+    file.write_text(page, encoding="utf-8")
+    browser.open(file.as_uri())
+    browser.evaluate(f"{INSIDE}.wholebody.seek(4 / 30)")
+    browser.until("document.getElementById('time').textContent.startsWith('Frame 4,')")
+    left = browser.evaluate("parseFloat(document.querySelector('.cursor').style.left)")
+    width = browser.evaluate("document.querySelector('canvas').clientWidth")
+    assert left == pytest.approx(62 + (width - 72) * 4 / 11 - 0.75, abs=1.0)
+
+
 def test_curves_of_long_recordings_are_drawn(browser: Any, page: str, tmp_path: Path) -> None:
     """Of 24,000 frames, more values than a function of a browser takes arguments."""
     (told,) = re.findall(r"const data = (.*);", page)[-1:]

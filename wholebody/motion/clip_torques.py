@@ -158,7 +158,8 @@ def torques(
         scene: things that hands and other parts may touch; they bear while they are within 5 mm of a thing that stands,
             and slower there than 0.15 m/s.
         feet: segments that may stand; left and right foot, or the ankles of a robot. A foot stands while its heel,
-            ball or tip of the toes is low and slow; without frames of such names, while its own frame is.
+            ball or tip of the toes is low and slow, or nearly on the ground and slower than 0.5 m/s, as where it comes
+            down and leaves; without frames of such names, while its own frame is.
         strength: of the person, for `lower`, `upper` and `share`; median of its sex and age if left out. For figures
             whose joints have no published strength, such as robots, the effort limits of their descriptions count.
         friction: coefficient of friction of the ground.

@@ -30,6 +30,8 @@ class HeldPoint:
     joint: int  # index of the joint that carries it
     place: Array  # (3,) in the joint's frame, metres
     edge: bool = False  # whether it is on the edge of a sole, so that its height alone counts: soles come down flat
+    lifts: bool = False  # whether its height does not count: the sole lifts there when the foot rolls over an edge
+    above: float = 0.0  # height above the sole, metres
     thing: bool = False  # whether it touches things, and not the ground
     share: float = 1.0  # of a hand that touches things: where it is between wrist and hand
     base: int = 0  # index of the joint in whose axes it is held; 0 is the world
@@ -42,12 +44,9 @@ def held_points(figure: Figure, roles: Roles, ground: Ground) -> list[HeldPoint]
     pin.framesForwardKinematics(figure.model, data, upright(figure))
     for side in ("left", "right"):
         heel, toe = f"{side}_ankle", f"{side}_toe"
-        if heel in roles.frames:
-            soles = _sole(figure, data, side, roles.frames[heel])
-            told = toe if toe in ground.rests else heel  # without toes the sole rests as the ankle does
-            for role, (joint, *places) in zip((heel, told), soles, strict=True):
-                if {heel, told} & resting:
-                    found += [HeldPoint(role, side, joint, place, edge=k > 0) for k, place in enumerate(places)]
+        told = toe if toe in ground.rests else heel  # without toes the sole rests as the ankle does
+        if heel in roles.frames and {heel, told} & resting:
+            found += _sole(figure, data, roles, side, told)
         for role in (f"{side}_{part}" for part in ("hand", "wrist", "knee")):
             if role in resting and role in roles.frames:
                 found.append(HeldPoint(role, "", *own[role]))
@@ -74,7 +73,7 @@ def touching_points(
         elbow, wrist, hand = (f"{role.split('_')[0]}_{part}" for part in ("elbow", "wrist", "hand"))
         carrier = role if role in places else wrist
         joint = placed[carrier][0]
-        if carrier == wrist and hand not in own and wrist not in roles.ends:
+        if carrier == wrist and hand not in own and own[wrist] != own.get(elbow):
             found.append(HeldPoint(role, "", *_end(figure, joint), thing=True, share=share, base=base))
             continue
         place = places[carrier]
@@ -98,24 +97,49 @@ def _end(figure: Figure, joint: int) -> tuple[int, Array]:
     return joint, 0.5 * (np.min(corners, axis=0) + np.max(corners, axis=0)) if corners else np.zeros(3)
 
 
-def _sole(figure: Figure, data: pin.Data, side: str, ankle: str) -> list[tuple[int, Array, Array, Array]]:
-    """Joint, and in it the middle, left and right place of the heel and of the front of a sole."""
-    heel = f"{side}_heel"
-    joint = int(figure.model.frames[figure.frame_id(heel if heel in figure.frames else ankle)].parentJoint)
-    corners = [np.array(data.oMi[joint].translation)[None]]
+def _sole(figure: Figure, data: pin.Data, roles: Roles, side: str, told: str) -> list[HeldPoint]:
+    """Of the heel, and of the front, which rests as the role `told` does: what rests, and the edge at both sides.
+
+    What rests is where the joint of the skeleton is slow: below the ankle, and the hinge of toes, which lie flat.
+    """
+    own, ankle, heel = roles.places(figure), f"{side}_ankle", f"{side}_heel"
+    frame = heel if heel in figure.frames else roles.frames[ankle]
+    foot = int(figure.model.frames[figure.frame_id(frame)].parentJoint)
+    every = np.concatenate([_corners(figure, data, foot), data.oMi[foot].translation[None]])
+    low, flat = float(every[:, 2].min()), _flat(every)
+    (back, right), (front, left) = flat.min(axis=0), flat.max(axis=0)
+    middle, toes, tip = 0.5 * (left + right), foot, front
+    joint, place = own[ankle]
+    below = float(np.clip(data.oMi[joint].act(place)[0], back, front))
+    hinge = np.array([front, middle, low])
+    joint, place = own.get(f"{side}_toe", (foot, place))
+    if joint != foot and len(more := _corners(figure, data, joint)):
+        hinge, toes, tip = data.oMi[joint].act(place), joint, float(_flat(more)[:, 0].max())
+    rests = np.array([below, middle, hinge[2]])  # as high as the hinge, so that both keep their distance from above
+    found, above = list[HeldPoint](), float(hinge[2] - low)
+    for role, at, carrier, edge in ((ankle, rests, foot, back), (told, hinge, toes, tip)):
+        lifts = at is rests and below > back
+        found.append(HeldPoint(role, side, foot, data.oMi[foot].actInv(at), lifts=lifts, above=above))
+        for y in (left, right):
+            local = data.oMi[carrier].actInv(np.array([edge, y, low]))
+            found.append(HeldPoint(role, side, carrier, local, edge=True))
+    return found
+
+
+def _corners(figure: Figure, data: pin.Data, joint: int) -> Array:
+    """(k, 3) lowest points, of spheres and edges too, of the pieces that a joint carries; none without pieces."""
+    found = []
     for piece in figure.geometry.geometryObjects:
         if piece.parentJoint == joint:
             swept, at = swept_points(piece.geometry), data.oMi[joint] * piece.placement
             if len(swept.points):
-                corners.append(swept.points @ at.rotation.T + at.translation - [0.0, 0.0, swept.radius])
-    every = np.concatenate(corners)
-    low = every[every[:, 2] <= every[:, 2].min() + SOLE]
-    (back, right), (front, left) = low[:, :2].min(axis=0), low[:, :2].max(axis=0)
-    found = []
-    for x in (back, front):
-        places = np.array([[x, 0.5 * (left + right)], [x, left], [x, right]])
-        found.append((joint, *(data.oMi[joint].actInv(np.array([*place, every[:, 2].min()])) for place in places)))
-    return found
+                found.append(swept.points @ at.rotation.T + at.translation - [0.0, 0.0, swept.radius])
+    return np.concatenate(found or [np.zeros((0, 3))])
+
+
+def _flat(corners: Array) -> Array:
+    """(k, 2) where the lowest of corners are, which are a sole."""
+    return np.asarray(corners[corners[:, 2] <= corners[:, 2].min() + SOLE, :2])
 
 
 def _length(motion: SkeletonMotion, joints: Mapping[str, str], first: str, last: str) -> float:

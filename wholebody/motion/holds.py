@@ -22,7 +22,7 @@ from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
 from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
 from wholebody.motion.windows import long_runs, runs
 
-FIRM, STRONG = 24.0, 2.0  # s, s²: weights of what rests over the time step in the first pass, over its square later
+FIRM, STRONG = 24.0, 3.0  # s, s²: weights of what rests over the time step in the first pass, over its square later
 NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole between
 TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
@@ -276,6 +276,8 @@ class Holds:
                 )
             if self.points[number].edge:
                 weights[number, :2] = 0.0
+            elif self.points[number].lifts:
+                weights[number, 2] = 0.0
             if not (down[number] or self.points[number].thing):
                 weights[number, 2] = 0.0  # contact says how high
         return goals, weights
@@ -363,7 +365,7 @@ class Holds:
                     rise = self._scale * (stand.height - before[-1].height)
                     flat = np.sqrt(max(length**2 - rise**2, 0.0)) / max(float(np.linalg.norm(along[:2])), 1e-9)
                     place = np.array([*(pivot[:2] + flat * along[:2]), 0.0])
-            place[2] = self._height(place, stand)
+            place[2] = point.above + self._height(place, stand)
         self._places[number, stand.first] = place
         return place
 

@@ -184,20 +184,26 @@ class Fitter:
         # a limb outside of its cone returns by half a step at a time; nearer to the edge it stays inside
         edge = self._cone_angles() < STEP
         joints = self._limb_joints[edge], self._base_joints[edge]
-        limits = [self._state.rows(self._cone_rows[edge], *joints)]
-        least = [np.minimum(CONE_MARGIN - self._angles[edge], 0.5 * STEP)]
+        cones = self._state.rows(self._cone_rows[edge], *joints)
+        contacts, missing = [np.zeros((0, len(lower)))], [np.zeros(0)]
         if near is not None and len(near.distance):
             found = self._workspace.rows.rows(near, CLEARANCE)
-            limits.append(self._state.rows(found.wrench, found.second, found.first))
-            least.append(np.minimum(CLEARANCE - found.gap, PUSH))
+            contacts.append(self._state.rows(found.wrench, found.second, found.first))
+            missing.append(np.minimum(CLEARANCE - found.gap, PUSH))
         for other, share, part, weight in midway:
             self._state.update(pin.interpolate(self.model, q, other, share))
             found = self._workspace.rows.rows(self._workspace.proximity.query(self._state.data, PASSING), SPARE)
             pull = weight * RELAXED**0.5  # what a row is multiplied by, its price is by the square of
-            missing = SPARE - found.gap
-            limits.append(pull * (1.0 - share) * self._state.rows(found.wrench, found.second, found.first))
-            least.append(pull * np.minimum(np.where(missing > 0.0, part, 1.0) * missing, PUSH))
-        among_rows, low = np.concatenate(limits), np.concatenate(least)
+            way = SPARE - found.gap
+            contacts.append(pull * (1.0 - share) * self._state.rows(found.wrench, found.second, found.first))
+            missing.append(pull * np.minimum(np.where(way > 0.0, part, 1.0) * way, PUSH))
+        among_rows, low = np.concatenate(contacts), np.concatenate(missing)
+        if len(low) > len(lower):
+            # where there is room, no more rows are active than this; where there is none, hundreds would take seconds
+            kept = np.sort(np.argpartition(-low, len(lower))[: len(lower)])
+            among_rows, low = among_rows[kept], low[kept]
+        among_rows = np.concatenate([cones, among_rows])
+        low = np.concatenate([np.minimum(CONE_MARGIN - self._angles[edge], 0.5 * STEP), low])
         sense = np.zeros(len(lower) + len(low), dtype=np.int32)
         sense[len(lower) :] = SOFT
         x, _, flag, _ = daqp.solve(

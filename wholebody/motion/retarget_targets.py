@@ -142,6 +142,7 @@ class Proportions:
         self._own, self._axes, self._fixed = _Body(places), rest_axes(motion, roles), figure.root == "fixed"
         self._joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
         self._soles = soles(motion, roles, ground.rests, places)
+        self._flat = flat_turns(motion, roles, ground.rests)
         own = self._own
         self._source = source = _Body(self._centres(motion))
         self._scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
@@ -160,7 +161,7 @@ class Proportions:
     def targets(self, motion: SkeletonMotion, under: Array | float = 0.0) -> Targets:
         """Goals of all frames of a motion of the same skeleton; `under` (n,) heights of the ground below it, metres."""
         own, source = self._own, _Body(self._centres(motion), self._source)
-        turns = _turns(motion, self._joint, own, self._turned, self._axes)
+        turns = _turns(motion, self._joint, own, self._turned, self._axes, self._flat)
         root = turns.get("pelvis", _pelvis(source, motion))
         if self._fixed:  # only what moves relative to the pelvis can be followed
             back = np.swapaxes(root, 1, 2)
@@ -176,13 +177,20 @@ class Proportions:
 
 
 def _turns(
-    motion: SkeletonMotion, joint: dict[str, int], own: _Body, turned: dict[str, Array], axes: Array | None
+    motion: SkeletonMotion,
+    joint: dict[str, int],
+    own: _Body,
+    turned: dict[str, Array],
+    axes: Array | None,
+    flat: Mapping[str, Array],
 ) -> dict[str, Array]:
     """Orientations (n, 3, 3) of pelvis, head, feet and hands by role; none where the rest posture does not stand."""
     if axes is None:
         return {}
     rigid = [role for role in ("pelvis", "head", "left_ankle", "right_ankle") if role in joint]
-    turns: dict[str, Array] = {role: motion.rotations[:, joint[role]] @ axes @ turned[role] for role in rigid}
+    turns: dict[str, Array] = {
+        role: motion.rotations[:, joint[role]] @ flat.get(role, np.eye(3)) @ axes @ turned[role] for role in rigid
+    }
     for side in ("left", "right"):
         turn = _hand_turn(motion, joint, side, axes)
         if turn is not None:
@@ -340,4 +348,21 @@ def soled(motion: SkeletonMotion, joint: Mapping[str, int], known: Mapping[str, 
         ankle, end = joint[toe.replace("toe", "ankle")], joint[toe]
         lengths = np.linalg.norm(motion.positions[:, end] - motion.positions[:, ankle], axis=1)
         found[toe] = motion.positions[:, ankle] + lengths[:, None] * (motion.rotations[:, ankle] @ local)
+    return found
+
+
+def flat_turns(motion: SkeletonMotion, roles: Roles, stands: Mapping[str, Mask]) -> dict[str, Array]:
+    """Rotations (3, 3) in the ankles' axes, by role, from the foot of the rest posture to one that is flat where it is.
+
+    Rest postures have feet that are rolled by 20 degrees, where the legs are apart. While ankle and toe both stand (n,)
+    the sole is flat.
+    """
+    found = {}
+    for side in ("left", "right"):
+        ankle, toe = f"{side}_ankle", f"{side}_toe"
+        if ankle in roles.joints and {ankle, toe} <= stands.keys() and (flat := stands[ankle] & stands[toe]).any():
+            up = motion.rotations[flat, motion.names.index(roles.joints[ankle])][:, 2].mean(axis=0)
+            if np.linalg.norm(up) > UPRIGHT:
+                quaternion = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), up / np.linalg.norm(up))
+                found[ankle] = quaternion.toRotationMatrix()
     return found

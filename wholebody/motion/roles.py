@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.structure import LIMBS, built, built_figure, link_end, side_of, thigh_start
+from wholebody.motion.structure import LIMBS, built, built_figure, side_of
 
 ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 
@@ -84,15 +84,9 @@ def matched(
 
 
 def _ends(figure: Figure, frames: Mapping[str, str]) -> dict[str, Array]:
-    """Where wrists are that have the frames of their elbows, and hips beside their thighs."""
-    found, joints = {}, set(figure.joints)
-    for role, name in frames.items():
-        frame = figure.model.frames[figure.frame_id(name)]
-        if role.endswith("wrist") and name == frames.get(role.replace("wrist", "elbow")):
-            found[role] = frame.placement.actInv(link_end(figure, frame.parentJoint))
-        elif role.endswith("hip") and {name, knee := frames.get(role.replace("hip", "knee"))} <= joints:
-            found[role] = thigh_start(figure, *map(figure.model.getJointId, (name, knee)))
-    return found
+    """Where parts are that are known by structure and not at their joints."""
+    parts = built_figure(figure)
+    return {role: parts[role].place for role, name in frames.items() if role in parts and parts[role].joint == name}
 
 
 def skeleton_roles(
@@ -164,7 +158,12 @@ def figure_roles(figure: Figure) -> dict[str, str]:
     # one name alone tells no limb: RR_hip_joint is of the rear legs of a quadruped
     found = {role: joint for role, joint in found.items() if _limb_of(role) & found.keys() - {role}}
     # where its links are says more than names: a yaw of a shoulder may be at the elbow, and a hand be the wrist
-    structure = built_figure(figure)
+    structure = {role: part.joint for role, part in built_figure(figure).items()}
+    named = {joint: role for role, joint in found.items()}
+    if any(joint in named and role not in _limb_of(named[joint]) for role, joint in structure.items()):
+        structure = {}  # of a trunk on a table the arms are lowest
+    if structure:  # joints that are named after a hand are those of fingers
+        found = {role: joint for role, joint in found.items() if role.split("_")[-1] != "hand"}
     found = {role: joint for role, joint in found.items() if joint not in structure.values()} | structure
     if figure.root == "free":
         links = (*figure.segments, *figure.frames)  # a root link without a shape is no segment

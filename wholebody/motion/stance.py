@@ -126,6 +126,10 @@ def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]
     return own_feet(figure) or tuple(name for term in given for name in term.names(figure))
 
 
+BEARING_SPEED, BEARING_HEIGHT = 0.5, 0.012
+"""m/s, m: a foot that comes down, or leaves, bears too, though its points roll on: both do between two steps."""
+
+
 def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
     """Frames (n,) in which each foot stands, that is, one of its points rests; none with a fixed root."""
     figure = clip.figure
@@ -139,8 +143,12 @@ def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
             for point in foot_points(figure)
             if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
         )
-        marks = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
-        found[name] = np.any(list(marks.values()), axis=0)
+        marks = [
+            mark
+            for rest in (StanceFeet(points or (name,)), StanceFeet(points or (name,), BEARING_SPEED, BEARING_HEIGHT))
+            for mark in standing(figure, clip.q, clip.dt, rest).values()
+        ]
+        found[name] = np.any(marks, axis=0)
     if not found:
         raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
     return found

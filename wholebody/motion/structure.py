@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
@@ -86,7 +86,7 @@ def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -
     long = [k for k in long if len(children[joints[k + 1]]) == 1] or long
     first = next((k for k in reversed(long) if k + 3 < len(joints)), long[-1])
     bones = float(lengths[joints[first + 1]]), float(lengths[joints[first + 2]])
-    return _Limb(joints, first, bones) if sum(bones) > 0.4 * reach[start] else None
+    return _Limb(joints, first, bones) if sum(bones) > 0.4 * (reach[start] - lengths[start]) else None
 
 
 def built(motion: SkeletonMotion, stands: bool = False) -> dict[str, str]:
@@ -180,25 +180,17 @@ def link_end(figure: Figure, joint: int) -> Array:
     return np.asarray(end)
 
 
-def thigh_start(figure: Figure, hip: int, knee: int) -> Array:
-    """(3,) where a thigh starts, in the axes of the hip's joint, metres: where that is, or beside the knee.
+class Part(NamedTuple):
+    """Where a role is: the joint that carries it, and its place (3,) in the axes of that, metres."""
 
-    A hinge is anywhere along its axis: that of a hip which turns as the knee does is in the plane of the knee's swing.
-    """
-    model, data = figure.model, figure.model.createData()
-    columns = pin.computeJointJacobians(model, data, upright(figure)).reshape(6, -1)[3:].T
-    if not model.joints[hip].nv == model.joints[knee].nv == 1:
-        return np.zeros(3)
-    axis, other = (columns[model.joints[joint].idx_vExtended] for joint in (hip, knee))
-    way = data.oMi[knee].translation - data.oMi[hip].translation
-    # cosine of the angle between the axes
-    return np.asarray(data.oMi[hip].rotation.T @ axis * (axis @ way) * (abs(axis @ other) > 0.99))
+    joint: str
+    place: Array
 
 
-def built_figure(figure: Figure) -> dict[str, str]:
-    """Joint by role of a figure, by its limbs at its zero; empty where it is no person's, as a quadruped's.
+def built_figure(figure: Figure) -> dict[str, Part]:
+    """Parts of a figure by role, by its limbs at its zero; empty where it is no person's, as a quadruped's.
 
-    A wrist has the joint of the elbow where the forearm ends without one.
+    A part is where the axes of its joints meet; a wrist is the end of a forearm that ends without a joint.
     """
     # Joints of one place are one, and a hinge is anywhere along its axis: that of a thigh's turn is at the hip.
     model, data = figure.model, figure.model.createData()
@@ -208,15 +200,17 @@ def built_figure(figure: Figure) -> dict[str, str]:
     # joints that are nearer to each other than this share of the figure's size meet in one place
     near = 0.07 * float(np.ptp(at[root:], axis=0).max())
     first, groups, parents = {root: 0}, [[root]], [-1]  # joint to its group
-    axes = np.asarray(data.J).reshape(6, -1)[3:]  # Pinocchio's is (6,) where there is one column
+    columns = np.asarray(data.J).reshape(6, -1)[3:]  # Pinocchio's is (6,) where there is one column
+    turned = [columns[:, joint.idx_vExtended] if joint.nv == 1 else np.zeros(3) for joint in model.joints[1:]]
+    axes = np.array([np.zeros(3), *turned])
     for joint in range(root + 1, model.njoints):
-        before, columns = model.parents[joint], model.joints[joint]
+        before = model.parents[joint]
         own, way = first[before], at[before] - at[joint]
-        # none of what slides; fingers begin at a wrist, which is where it is
-        hinge = columns.nv == 1 and list(model.parents).count(joint) < 2
-        axis = axes[:, columns.idx_vExtended] if hinge else np.zeros(3)
-        along = (axis @ way) * axis
-        if own and list(model.parents).count(before) == 1 and np.linalg.norm(way - along) < near:
+        # fingers begin at a wrist, which is where it is
+        along = (axes[joint] @ way) * axes[joint] if list(model.parents).count(joint) < 2 else np.zeros(3)
+        # toes turn about an axis beside that of the ankle, an arm beside that of its clavicle
+        meets = all(_apart(real[joint] - real[k], axes[joint], axes[k]) < 0.5 * near for k in groups[own])
+        if own and list(model.parents).count(before) == 1 and np.linalg.norm(way - along) < near and meets:
             groups[own].append(joint)
             at[joint] += along
         else:
@@ -224,32 +218,70 @@ def built_figure(figure: Figure) -> dict[str, str]:
             groups.append([joint])
             own = len(groups) - 1
         first[joint] = own
-    places, names = [at[group[-1]] for group in groups], list[dict[str, str]]()
-    for number, (group, place) in enumerate(zip(groups, places, strict=True)):
-        away = np.round(np.linalg.norm(real[group] - place, axis=1), 3)
-        meeting = group[len(group) - 1 - int(np.argmin(away[::-1]))]  # of those at the place the last one
-        named = {"wrist": group[0], "ankle": group[-1], "head": group[-1], "": meeting}
-        if number in parents:  # thighs stand straight, though a leg may be beside where its axes meet
-            aside = real[group, :2] - places[parents.index(number)][:2]
-            if np.linalg.norm(aside[group.index(meeting)]) - np.linalg.norm(aside[-1]) > near:
-                named["hip"] = group[-1]
-        names.append({part: model.names[joint] for part, joint in named.items()})
+    places, joints = [at[group[-1]] for group in groups], [group[-1] for group in groups]
     for number, group in enumerate(groups):  # where links end
         if number not in parents and group[-1] not in model.parents:
             parents.append(number)
+            joints.append(group[-1])
             places.append(data.oMi[group[-1]].act(link_end(figure, group[-1])))
-            names.append({"": model.names[group[-1]]})
     offsets = np.array([place - places[max(parent, 0)] for place, parent in zip(places, parents, strict=True)])
-    numbers = tuple(f"{names[k]['']} {k}" for k in range(len(names)))
-    turns = np.tile(np.eye(3), (1, len(names), 1, 1))
+    numbers = tuple(f"{model.names[joint]} {k}" for k, joint in enumerate(joints))
+    turns = np.tile(np.eye(3), (1, len(numbers), 1, 1))
     still = SkeletonMotion(numbers, np.array(parents), offsets, turns, np.array(places)[None], 1.0)
     found = {role: numbers.index(name) for role, name in built(still, stands=True).items()}
     found = {role: k for role, k in found.items() if role.split("_")[-1] in PARTS}
-    roles = {role: names[k].get(role.split("_")[-1], names[k][""]) for role, k in found.items()}
-    return roles if _is_person(roles, {role: places[k] for role, k in found.items()}, figure.root == "free") else {}
+    meeting = {role: groups[k] for role, k in found.items() if k < len(groups)}
+    # a bone is carried by the last joint before it: what turns beyond an elbow, a knee or a wrist turns the next one
+    carriers = {role: joints[k] for role, k in found.items()} | {
+        role: group[0] if role.split("_")[-1] in ("elbow", "knee", "wrist") else group[-1]
+        for role, group in meeting.items()
+    }
+    if not _is_person(carriers, {role: places[k] for role, k in found.items()}, figure.root == "free"):
+        return {}
+    centres = {role: places[k] for role, k in found.items()} | _centres(meeting, real, axes)
+    return {role: Part(model.names[joint], data.oMi[joint].actInv(centres[role])) for role, joint in carriers.items()}
 
 
-def _is_person(joints: Mapping[str, str], places: Mapping[str, Array], walks: bool) -> bool:
+def _apart(way: Array, axis: Array, other: Array) -> float:
+    """Distance of two lines, metres, from a point on the one to a point on the other; 0 of what does not turn."""
+    normal = cross(axis, other)
+    size = float(np.linalg.norm(normal))
+    if size > 0.1:
+        return abs(float(way @ normal)) / size
+    return float(np.linalg.norm(cross(way, axis)))
+
+
+def _centres(meeting: Mapping[str, list[int]], real: Array, axes: Array) -> dict[str, Array]:
+    """Places (3,) nearest to the axes of joints, by role; `real` (j, 3) and `axes` (j, 3) are those of all joints."""
+    found, hinges = {}, {}
+    for role, joints in meeting.items():
+        across = np.eye(3) - axes[joints, :, None] * axes[joints, None, :]
+        middle = real[joints].mean(axis=0)
+        # the little of the identity leaves the middle where lines do not say, along an axis
+        found[role] = middle + np.linalg.solve(
+            across.sum(axis=0) + 1e-9 * np.eye(3), (across @ (real[joints] - middle)[:, :, None]).sum(axis=0)[:, 0]
+        )
+        if np.linalg.norm(cross(axes[joints], axes[joints[-1]]), axis=1).max() < 0.1:
+            hinges[role] = axes[joints[-1]]
+    limbs = [[f"{side}_{part}" for part in parts[:3]] for parts in LIMBS for side in ("left", "right")]
+    for start, middle, end in (limb for limb in limbs if limb[1] in hinges):
+        swing = hinges[middle]
+        beside = start in meeting and bool(
+            abs(axes[meeting[start][-1]] @ swing) > 0.99
+        )  # nothing says how far a leg is out
+        known = [
+            role for role in (start, end) if role in meeting and role not in hinges and not (role == start and beside)
+        ]
+        if known:
+            found[middle] += swing * (swing @ (np.mean([found[role] for role in known], axis=0) - found[middle]))
+        hung = [start] * beside + [role for role in (end,) if role in hinges and abs(hinges[role] @ swing) > 0.99]
+        for role in hung:
+            last = meeting[role][-1]
+            found[role] = real[last] + swing * (swing @ (found[middle] - real[last]))
+    return found
+
+
+def _is_person(joints: Mapping[str, int], places: Mapping[str, Array], walks: bool) -> bool:
     """Whether shoulders stand above hips, by their places (3,), and no joint but a forearm's has two roles.
 
     Those of a quadruped are beside each other, and its legs end at their knees. What `walks` may have legs alone, whose

@@ -265,6 +265,14 @@ class TrackedMotions:
         self._attraction.weigh(usual**2)
         return way
 
+    def step(self, q: Array, target: Array) -> Array:
+        """The posture (nq,) of one step from q towards a target, in which all freedoms count alike, as in lengths."""
+        self._attraction.weigh(np.ones(self._model.nv))
+        self._attraction.toward(target)
+        found: Array = self._tracker.step(q).q
+        self._attraction.weigh(self.shares**2)
+        return found
+
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `Geodesics`."""
         found, late = path.copy(), np.zeros(len(path), dtype=bool)

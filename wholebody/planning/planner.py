@@ -29,7 +29,7 @@ from wholebody.motion.clip import Clip
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
 from wholebody.planning.sampling import Sampler, holds
-from wholebody.planning.smoothing import length, resampled, shortcut, smooth
+from wholebody.planning.smoothing import length, resampled, shortcut, smooth, tighten
 from wholebody.planning.timing import Pace, Timing
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
@@ -255,6 +255,10 @@ class _Search:
             if (found := length(model, path)) < most:
                 best, most = path, found
         if best is not None:
+            if self._local is not self._slides:
+                # most of what is left is for smoothing
+                with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
+                    best = tighten(model, best, self._local, self._slides)
             return best, f"the shortest of {runs} searches"
         if not self._reached and BUDGET.spent < SEARCHED:
             return None, f"no posture meets the goals: {self._said}"

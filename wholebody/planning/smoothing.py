@@ -11,10 +11,13 @@ from scipy.ndimage import gaussian_filter1d
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.control import BUDGET
-from wholebody.planning.local_planner import LocalPlanner
+from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
 WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
+APART = 0.35  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
+OVERSHOOT = 1.6  # of the way to between its neighbours that a posture moves; 1 = converges in twice as many sweeps
+SWEPT = 0.99  # of its length before a sweep: where it is longer after one, a path counts as tight
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
 
 
@@ -54,10 +57,52 @@ def _evened(model: pin.Model, part: list[Array], local: LocalPlanner, rng: np.ra
     return local.through(even) if length(model, list(even)) < length(model, part) - LEAST else []
 
 
+def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: TrackedMotions) -> list[Array]:
+    """A path drawn tight round things as a band is: sweeps bring each posture to between its neighbours.
+
+    Steps of the tracker do so where things are in the way. Few shortcuts do as they go from one posture to another one,
+    and none through what touches on both sides (elastic bands, Quinlan and Khatib 1993; by successive overrelaxation).
+    """
+    band, before = _band(model, path, local), np.inf
+    while len(band) > 2 and not BUDGET.over and (now := length(model, band)) < SWEPT * before:
+        before = now
+        for k in range(1, len(band) - 1):
+            first, q, last = band[k - 1 : k + 2]
+            middle = np.asarray(pin.interpolate(model, first, last, 0.5))
+            over = np.asarray(pin.interpolate(model, q, middle, OVERSHOOT))
+            if local.joined(first, over, np.inf) and local.joined(over, last, np.inf):
+                band[k] = over
+            elif not BUDGET.over:
+                slid = slides.step(q, over)
+                if local.joined(first, slid, np.inf) and local.joined(slid, last, np.inf):
+                    band[k] = slid
+    found = [band[0]]
+    for q in band[1:]:
+        found += local.joined(found[-1], q, np.inf) or [q]
+    return found
+
+
+def _band(model: pin.Model, path: list[Array], local: LocalPlanner) -> list[Array]:
+    """Postures of a path about `APART`, and its own ones between two of them that a straight motion does not join."""
+    at = _lengths(model, path)
+    places = np.linspace(0.0, at[-1], max(4, int(np.ceil(at[-1] / APART)) + 1))
+    even, found = resampled(model, path, len(places)), [path[0]]
+    for (low, high), q in zip(pairwise(places), even[1:], strict=True):
+        if not local.joined(found[-1], q, np.inf):
+            found += [path[k] for k in np.flatnonzero((low < at) & (at < high))]
+        found.append(q)
+    return found
+
+
+def _lengths(model: pin.Model, path: Sequence[Array]) -> Array:
+    """(n,) lengths of a path as far as each of its postures."""
+    return np.concatenate([[0.0], np.cumsum([np.linalg.norm(pin.difference(model, *pair)) for pair in pairwise(path)])])
+
+
 def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
     """Postures (count, nq) at equal lengths on a path."""
     steps = [np.asarray(pin.difference(model, *pair)) for pair in pairwise(path)]
-    at = np.concatenate([[0.0], np.cumsum([np.linalg.norm(step) for step in steps])])
+    at = _lengths(model, path)
     found = []
     for place in np.linspace(0.0, at[-1], count)[1:-1]:
         gap = int(np.clip(np.searchsorted(at, place, side="right") - 1, 0, len(steps) - 1))

@@ -151,3 +151,25 @@ def test_out_of_reach_an_arm_comes_as_near_as_least_squares_from_many_starts(see
     solution = wb.solve(wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", target)]))
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error <= 1.1 * min(map(np.linalg.norm, ends)) + 1e-4
+
+
+def test_who_stands_inside_a_table_crawls_under_it_to_goals_that_contradict(honest):
+    figure = wb.load("human", sex="female")
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((1.6, 1.0, 0.04)), name="table", at=(0.3, 0.0, 0.62))
+    touches = [wb.Touch(part, "floor") for part in ("left_palm", "right_palm", "left_shank", "right_shank")]
+    problem = wb.Problem(scene, goals=[wb.Point("left_palm", (0.6, 0.25, 0.02)), *touches])
+    solution = honest(problem, wb.solve(problem))
+    # the palm is to be at a height of 20 mm, and on the floor: each goal is missed by half of that
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error == pytest.approx(0.01, abs=1e-4)
+
+
+def test_what_goals_pull_into_things_is_no_proof_that_nothing_can_hold(honest):
+    """Two boxes around the chest and the head; two goals of one fingertip contradict, and lead nowhere out of them."""
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.7, 0.5, 0.4)), name="box", at=(-0.1, 0.0, 1.3))
+    scene.add(wb.Box((0.7, 0.3, 0.5)), name="other", at=(0.1, 0.3, 1.4))
+    assert wb.solve(wb.Problem(scene)).solved
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (-0.3, 0.1, height)) for height in (1.4, 1.5)])
+    assert honest(problem, wb.solve(problem)).status == "unreachable"

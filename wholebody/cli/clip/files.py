@@ -14,8 +14,10 @@ from wholebody.base.checks import TIME_STEP, number, shown
 from wholebody.base.errors import InputError
 from wholebody.base.files import check_writable, checked_target, write
 from wholebody.cli.clip.arguments import clip_of, figure_of, scene_of
+from wholebody.cli.clip.check import show
 from wholebody.cli.tables import bar, console, table
 from wholebody.motion.batch import read_many
+from wholebody.motion.checking import check
 from wholebody.motion.files import check_ending
 from wholebody.motion.reading import read_skeleton
 from wholebody.motion.retargeting import bone_errors, retarget
@@ -82,6 +84,8 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
         print(f"wrote {write(arguments.html, page)}")
     if arguments.rate is not None:
         clip = clip.resampled(1.0 / arguments.rate)
+    with bar(said := "checking every pair", len(clip)) as tell:
+        show(check(clip, scene, progress=lambda done: tell(done, said)))
     written = clip.write(arguments.out, bare=arguments.bare)
     print(f"wrote {written}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
     return 0

@@ -24,6 +24,7 @@ from wholebody.figures.surface.fields import (
     placed,
     round_cone,
     union,
+    without,
 )
 from wholebody.figures.surface.garments import Claim, Garment, bounds
 from wholebody.figures.surface.hand_shape import hand_shape
@@ -82,6 +83,9 @@ class PersonShape:
         ]
         hips, neck = self.bind["pelvis"][2, 3], self.bind["neck"][2, 3]
         self._trunk = trunk(union(pieces), hips - 0.2, neck + 0.1, float(self.bind["upper_lumbar"][0, 3]))
+        size, radius = self.size, 0.98 * person.radius("neck")
+        chin = self.at("head", (size.head_x - 0.030 * self._scale, 0.0, size.head_bottom + 0.06 * self._scale))
+        self._throat = round_cone(self.at("neck", (0.0, 0.0, -0.04)), chin, 1.06 * radius, 0.98 * radius)
         parts = {"clavicle", "upper_arm", "forearm", "thigh", "shank"}
         self._limbs = {name: self._limb_field(name) for name in self.bind if name.partition("_")[2] in parts}
 
@@ -106,12 +110,19 @@ class PersonShape:
         balls = caps(self.solids, segment)
         if part == "clavicle":
             return placed(limb(balls), self.bind[segment])
-        if part == "thigh":  # it tapers evenly from the hip's piece to the knee: where the knee's begins, it is deeper
-            balls[-2] = np.array([balls[-2][0][0], 0.0, -0.78 * self.person.length(segment)]), balls[-2][1]
+        if part == "thigh":
+            # Girth of the lower thigh: 1.06 times the calf's (ANSUR II: 1.04 of men, 1.07 of women). It is put higher
+            # than it is measured, because the seated knee is not to become higher.
+            radius, length = 1.06 * self.person.radius("calf"), self.person.length(segment)
+            (back, _, _), knee = balls[-2]
+            above = np.array([back + radius - knee, 0.0, -0.70 * length])  # the underside is level with the seat
+            balls[-2:-1] = [(above, radius), (np.array([back, 0.0, -0.88 * length]), knee)]
         child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
         end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
         (_, first), (_, last) = balls[0], balls[-1]
         start, top = (0.95 * first, -0.015) if part == "thigh" else (first, 0.0)
+        if part == "upper_arm":
+            start = min(first, 1.3 * self.person.size("shoulder_top"))
         if part == "shank":
             start = caps(self.solids, f"{side}_thigh")[-1][1]
             del balls[0]  # the bone below the knee, around which there is flesh
@@ -130,15 +141,21 @@ class PersonShape:
                 found.append(Claim(name, _between(self._trunk, low, high)))
         for segment in segments:
             side, _, part = segment.partition("_")
-            if segment in self._limbs:
-                found.append(Claim(segment, self._limbs[segment], 0.020 if part == "upper_arm" else 0.014))
+            if part == "upper_arm":
+                # the shoulder's end of the arm turns with the shoulder: with the arm it would hang below a raised one
+                beyond = half_space(self.at(segment, (0.0, 0.0, -0.035 * self._scale)), self.bind[segment][:3, 2])
+                found.append(Claim(segment, intersection(self._limbs[segment], beyond), 0.020))
+                found.append(Claim("thorax", grown(self._armpit(side)[1], -0.006), 0.022))
+            elif segment in self._limbs:
+                found.append(Claim(segment, self._limbs[segment], 0.014))
             if part == "clavicle":
                 found.append(Claim(segment, self._trapezius(side)))
+            if segment == "neck":
+                low, high = (float(self.bind[name][2, 3]) for name in ("neck", "head"))
+                found.append(Claim(segment, _between(self._throat, low, high)))
             if part == "thigh":
                 found.append(Claim("pelvis", self._buttock(dict(SIDES)[side])))
                 found.append(Claim(f"{segment}/half", self._spread(dict(SIDES)[side])))
-            if part == "upper_arm":  # a raised arm pulls the flank along
-                found.append(Claim(f"{segment}/half", grown(self._armpit(side)[1], -0.006), 0.022))
             if part in HALVES:
                 thigh = 0.335 * self.person.size("thigh_clearance") / self._scale
                 radius = {"upper_arm": 0.035, "forearm": 0.020, "hand": 0.026, "thigh": thigh, "shank": 0.030}[part]
@@ -151,7 +168,7 @@ class PersonShape:
     def _shirt(self) -> Garment:
         size, scale = self.size, self._scale
         neck = self.at("neck")
-        solids = [self._trunk]
+        solids = [self._trunk, self._throat]
         for side, sign in SIDES:
             solids += [
                 self._limbs[f"{side}_clavicle"],
@@ -162,14 +179,11 @@ class PersonShape:
             if size.body.sex == "female":
                 height = float(self.at("thorax")[2])
                 front = self._trunk_ends(height - 0.01 * scale)[1]
-                middle = (front - 0.036 * scale, sign * 0.076 * scale, height - 0.012 * scale)
-                solids.append(ellipsoid(middle, np.array([0.066, 0.062, 0.062]) * scale))
-        collar = 1.04 * size.body.radius("neck") + 0.006
-        solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
+                middle = (front - 0.044 * scale, sign * 0.074 * scale, height - 0.014 * scale)
+                solids.append(ellipsoid(middle, np.array([0.062, 0.066, 0.064]) * scale))
         body = grown(union(solids, 0.035 * scale), CLOTH)
         hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
-        opening = half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))
-        cuts = [hem, opening]
+        cuts = [hem, self._collar(0.0)]
         for side, _ in SIDES:
             wrist, elbow = self.at(f"{side}_hand"), self.at(f"{side}_forearm")
             along = (wrist - elbow) / np.linalg.norm(wrist - elbow)
@@ -178,8 +192,7 @@ class PersonShape:
         points = [self.at(name) for name in [*segments, *self._sided("hand")]]
         points += [np.array([0.1, 0.0, self._belt() - 0.04]), np.array([-0.1, 0.0, neck[2] + 0.06])]
         low, high = bounds(points, 0.085 * scale + 0.05)
-        claims = self._claims([name for name in segments if name != "neck"])
-        return Garment("shirt", COLORS.shirt, body, low, high, 0.020, claims, cuts)
+        return Garment("shirt", COLORS.shirt, body, low, high, 0.020, self._claims(segments), cuts)
 
     def _elbow(self, side: str) -> Field:
         """What fills the groove between the ends of upper arm and forearm."""
@@ -190,9 +203,15 @@ class PersonShape:
     def _trapezius(self, side: str) -> Field:
         """The slope from the side of the neck to the end of the shoulder."""
         scale, sign = self._scale, dict(SIDES)[side]
-        high = self.at("neck", np.array([-0.022, sign * 0.024, 0.028]) * scale)
+        radius = self.person.radius("neck")
+        high = self.at("neck", (-0.4 * radius, 0.4 * sign * radius, 0.016 * scale))
         low = self.at(f"{side}_upper_arm") + np.array([-0.006, -sign * 0.016, 0.004]) * scale
-        return round_cone(high, low, 0.036 * scale, 0.034 * scale)
+        return round_cone(high, low, 0.45 * radius, 0.034 * scale)
+
+    def _collar(self, below: float) -> Field:
+        """Everything under the shirt's upper edge, or under a plane that many metres below it."""
+        edge = self.at("neck", (0.0, 0.0, 0.036 * self._scale))
+        return grown(half_space(edge, (0.42, 0.0, 1.0)), -below)
 
     def _armpit(self, side: str) -> list[Field]:
         """Folds before and behind the armpit: from the chest and from the flank to the upper arm."""
@@ -266,16 +285,15 @@ class PersonShape:
         shape, frame = head_shape(self.size), self.bind["head"]
         scale = self._scale
         bottom, top = self.at("neck", (0.0, 0.0, -0.04)), self.at("head", (self.size.head_x, 0.0, self.size.head_top))
-        radius = 0.98 * self.person.radius("neck")
-        throat = self.at("head", (self.size.head_x - 0.030 * scale, 0.0, self.size.head_bottom + 0.06 * scale))
-        neck = round_cone(bottom, throat, 1.06 * radius, 0.98 * radius)
-        skin = union([placed(shape.skin, frame), neck], 0.022)
+        shoulders = union([self._trunk, *(self._trapezius(side) for side, _ in SIDES)], 0.035 * scale)
+        shoulders = union([shoulders, self._throat], 0.022)
+        shoulders = without(shoulders, self._collar(0.02))
+        skin = union([placed(shape.skin, frame), shoulders], 0.022)
         low, high = bounds([bottom, top], 0.15 * scale)
-        low[2], high[2] = bottom[2] - radius - 0.02, top[2] + 0.03
-        root, atlas = self.at("neck")[2], self.at("head")
+        low[2], high[2] = bottom[2] - 0.05, top[2] + 0.03
+        atlas = self.at("head")
         claims = [
-            Claim("thorax", half_space(self.at("neck"), (0.0, 0.0, 1.0)), 0.015),
-            Claim("neck", lambda points: _outside(points[:, 2], root, atlas[2]), 0.015),
+            *self._claims([*TRUNK, "neck", *self._sided("clavicle", "upper_arm")]),  # as the shirt's over it
             Claim("head", union([half_space(atlas, (0.0, 0.0, -1.0)), placed(shape.skin, frame)]), 0.012),
         ]
         rigid = [Claim("head", lambda points: np.zeros(len(points)))]

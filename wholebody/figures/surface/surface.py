@@ -39,7 +39,7 @@ def _kept(person: Person, hand: str) -> Surface:
         return hand_surface(person, hand) if hand else person_surface(person)
 
     # The number is another one whenever a shape, a weight or the layout changes.
-    digest = hashlib.sha256(f"22 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
+    digest = hashlib.sha256(f"25 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
     return cached_entry(digest.hexdigest(), make, _packed, _unpacked)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain, islice
@@ -16,52 +17,31 @@ from wholebody.methods.control import Control
 from wholebody.methods.qp.before_contact import at_its_place, before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
-from wholebody.methods.qp.feasibility import Feasibility
-from wholebody.methods.qp.iterates import Attempt, LocalSolution, Run, better, held, moving
+from wholebody.methods.qp.iterates import Attempt, LocalSolution, held, moving
+from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import Minima, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import Effort
-from wholebody.terms.linearisation import Lineariser
 
 
-class Multistart:
-    """The search for one problem; it keeps the best posture."""
+class Multistart(Search):
+    """The search for one problem."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
-        self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
-        self.subproblem = Subproblem(problem, workspace.state)
-        self.lineariser = problem.lineariser(workspace)
-        self.trace: list[TraceEntry] = []
-        self._shared = Run(self.subproblem, self.lineariser, solver, self.trace, control)
-        self.spent = self.tried = 0  # iterations, and starts of attempts
-        self.how, self.contradictions = "directly", tuple[Contradiction, ...]()
+        super().__init__(problem, workspace, solver, settings, control)
+        self.tried = 0  # starts of attempts
+        self.contradictions = tuple[Contradiction, ...]()
         self._start = problem.scene.figure.clamp(problem.start)
-        self._first: int | None = None  # programs of the first attempt, once it is made
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
-        self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self.out_of_reach = False  # as it seems
-        self._best: LocalSolution | None = None
-
-    @property
-    def _left(self) -> int:
-        """Programs that attempts after the first may still solve."""
-        return self.settings.budget - (0 if self._first is None else len(self.trace) - self._first)
-
-    @property
-    def best(self) -> LocalSolution:
-        """The best posture so far."""
-        assert self._best is not None
-        return self._best
 
     def run(
         self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = (), least: float = 0
@@ -111,7 +91,7 @@ class Multistart:
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt]:
         """Those in which measures do not count."""
-        start, state, least, tried = self._start, self.lineariser.state, self._least, self.tried
+        start, least, tried = self._start, self._least, self.tried
         self._first = len(self.trace)
         yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
@@ -130,13 +110,18 @@ class Multistart:
             rest = SQP(relaxed, self.settings.tolerance, self._at_most(SEARCH.rest_programs), "through things")
             if (local := self._ran(rest, start)).violation.worst <= SEARCH.reached * self.settings.tolerance:
                 yield Attempt([local.q], self._free, "from a rest through things")
+        restarts = self.settings.restarts
+        yield from self._from_elsewhere(min(restarts, SEARCH.inside_probes) if least else restarts)
+
+    def _from_elsewhere(self, count: int) -> Iterator[Attempt]:
+        """Those from other starts, of which there are `count`."""
         rng = np.random.default_rng(self.settings.seed)
-        count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
         if few := moving(self._shared, self.best.q) < SEARCH.few:
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
-        others = (throughout if few else restarts)(self.problem, state, start, rng, count)
+        others = (throughout if few else restarts)(self.problem, self.lineariser.state, self._start, rng, count)
         starts = self.lineariser.defined(others)
-        beside = self._beside(0 if few or least or not self.problem.goals else min(count, SEARCH.beside))
+        aimed = self.problem.goals and not (few or self._least or self.out_of_reach)
+        beside = self._beside(min(count, SEARCH.beside) if aimed else 0)
         for _ in range(count):  # in turn: one from beside takes the programs of two others
             yield Attempt(islice(beside, 1), self._free, "from beside the goals")
             yield Attempt(islice(starts, 2), self._relaxed, "from another start")
@@ -170,26 +155,6 @@ class Multistart:
             self.spent += local.iterations
             yield local.q
 
-    def directly(self, start: Array) -> LocalSolution:
-        """A descent; without measures by whole steps as long as these gain much."""
-        return self._ran(self._descent(self.settings.iterations, None, "", full_step=not self.settings.measures), start)
-
-    def feasibility_first(self, start: Array) -> LocalSolution | None:
-        """Find a feasible posture without measures, and descend from there; None where the goals are out of reach."""
-        local = self._through_things(start, "feasibility")
-        if local is None or local.violation.worst > self.settings.tolerance or not self.settings.measures:
-            return local
-        self._accept(local, "by feasibility first")
-        return self._descend(local.q)
-
-    def _through_things(self, start: Array, note: str) -> LocalSolution | None:
-        """Feasibility with pairs relaxed by a depth, then with the true clearances; None where out of reach."""
-        most, relaxed = self._at_most(SEARCH.probe_programs), self.lineariser.relaxed(SEARCH.start_depth)
-        through = self._ran(self._feasibility(relaxed, most, note), start)
-        if through.violation.worst > SEARCH.reached * self.settings.tolerance:
-            return None
-        return self._ran(self._feasibility(self.lineariser, most, note), through.q)
-
     def _closing(self, start: Array) -> LocalSolution | None:
         """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
         for q in self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start)):
@@ -201,7 +166,7 @@ class Multistart:
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         relaxed = self._probe(start, SEARCH.relaxation_depth)
-        if relaxed.violation.worst > SEARCH.reached * self.settings.tolerance:
+        if not self._ends(relaxed, SEARCH.reached):
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
         return self._free(relaxed.q, start)
@@ -224,7 +189,7 @@ class Multistart:
         if there is None or self.control.over:
             return False
         tolerance, before = self.settings.tolerance, self.best.measure
-        search = Multistart(there, self.lineariser.workspace, self.solver, self.settings, self.control)
+        search = Search(there, self.lineariser.workspace, self.solver, self.settings, self.control)
         local = search.directly(self._start)
         if local.violation.worst > tolerance:
             local = search.feasibility_first(self._start) or local
@@ -287,23 +252,6 @@ class Multistart:
         for local in sorted(found, key=lambda each: each.measure)[:most]:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
-    def _probe(self, start: Array, depth: float) -> LocalSolution:
-        """Test by few programs whether the goals can be met from a start, pieces inside each other by a depth [m]."""
-        most = max(min(self._left, SEARCH.probe_programs), 1)
-        lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        return self._ran(self._feasibility(lineariser, most, "probe"), start)
-
-    def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
-        """The end of a stage from a posture (nq,), whose iterations count."""
-        self.spent += (local := stage.run(start)).iterations
-        if self._near is None or local.violation.total < self._near.violation.total:
-            self._near = local
-        return local
-
-    def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
-        shared = with_values(self._shared, lineariser=lineariser)
-        return Feasibility(shared, self.settings.tolerance, most, note, figure=self.problem.scene.figure)
-
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""
         tolerance = self.settings.tolerance
@@ -314,6 +262,8 @@ class Multistart:
             self._accept(local, self.how)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
+        if self.problem.goals and not held(self.best, tolerance):
+            self._seek_held()
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
         near, missed = self._near, self.best.violation
@@ -323,6 +273,24 @@ class Multistart:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
                 self._best = local
+
+    def _seek_held(self) -> None:
+        """Seek a posture that keeps the constraints, as near to the goals as any; then one without goals."""
+        tolerance, near = self.settings.tolerance, self._near
+        if near is not None and (self.out_of_reach or self._least):  # else other starts were tried
+            self._missed = SEARCH.agree * near.violation.left
+            self._minima, self._relaxed_minima = Minima(), Minima()
+            self._search(self._from_elsewhere(self.settings.restarts))
+            self._accept(self._ran(self._closest(), self.best.q), self.how)
+        if not held(self.best, tolerance) and not self.control.over:
+            alone, settings = copy.copy(self.problem), replace(self.settings, measures=False)
+            alone.goals = ()
+            search = Multistart(alone, self.lineariser.workspace, self.solver, settings, self.control)
+            found = search.run()
+            self.spent += search.spent
+            self.trace += search.trace
+            for stage in (self._feasibility(self.lineariser, 0, ""), self._closest()):
+                self._accept(self._ran(stage, found.q), self.how)
 
     def _proven(self) -> bool:
         """Whether the best posture is known to be the closest to the goals."""
@@ -353,43 +321,3 @@ class Multistart:
             nearest = self._descend(self.best.q, note="nearest", measures=False)
         self._accept(nearest, self.how)
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
-
-    def _at_most(self, programs: int) -> int:
-        """The smaller of this number of programs and that of one descent."""
-        return min(programs, self.settings.iterations)
-
-    def _closest(self) -> Closest:
-        return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)
-
-    def _stay(self, local: LocalSolution) -> LocalSolution:
-        """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
-        nearest = self.lineariser.at(local.q, 0.0).goal_error
-        most = self._at_most(SEARCH.staying) if held(local, self.settings.tolerance) else self.settings.iterations
-        stayed = self._ran(self._descent(most, nearest, "nearest"), local.q)
-        left = float(np.linalg.norm(self.lineariser.at(stayed.q, 0.0).goal_error))
-        violation = with_values(stayed.violation, goal=left, left=left)
-        return with_values(stayed, violation=violation, converged=local.converged)
-
-    def _descend(
-        self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
-    ) -> LocalSolution:
-        """Descend from a start; restore constraints that are violated at its end."""
-        iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
-        local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
-        if (most is None or local.iterations < most) and not held(local, self.settings.tolerance):
-            stayed = self._stay(local)
-            local = stayed if better(stayed, local, self.settings) else local
-        return local
-
-    def _descent(
-        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
-        tolerance: float | None = None,
-    ) -> SQP:  # fmt: skip
-        tolerance, measures = tolerance or self.settings.tolerance, measures and self.settings.measures
-        return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
-
-    def _accept(self, local: LocalSolution, how: str) -> bool:
-        """Keep the better one; whether the problem is solved now."""
-        if self._best is None or better(local, self._best, self.settings):
-            self._best, self.how = local, how
-        return self.best.violation.worst <= self.settings.tolerance

@@ -101,9 +101,10 @@ def read(path: Path, figure: Figure) -> Frames:
         raise FileFormatError(f"{path.name}: q of shape {q.shape} and dt of shape {dt.shape} are no clip")
     _check_joints(path, joints, figure)
     if q.shape[1] != figure.model.nq:
+        free = figure.root == "fixed" and q.shape[1] == ROOT_SIZE + figure.model.nq
+        mend = "with root='free' (--root free)" if free else "that the clip was made with"
         raise FileFormatError(
-            f"{path.name}: {q.shape[1]} values a frame, and {figure.name} has {figure.model.nq}; load the figure that "
-            "the clip was made with"
+            f"{path.name}: {q.shape[1]} values a frame, and {figure.name} has {figure.model.nq}; load the figure {mend}"
         )
     name = str(arrays["name"])
     name = name if name.strip() and name.isprintable() else title_of(path)

@@ -1,0 +1,131 @@
+"""Descents of one problem, and the best of their ends."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.base.arrays import Array, with_values
+from wholebody.methods.control import Control
+from wholebody.methods.qp.closest import Closest
+from wholebody.methods.qp.feasibility import Feasibility
+from wholebody.methods.qp.iterates import LocalSolution, Run, better, broken, held
+from wholebody.methods.qp.settings import SEARCH, Settings
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.sqp import SQP
+from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
+from wholebody.solution import TraceEntry
+from wholebody.terms.linearisation import Lineariser
+
+
+class Search:
+    """What descents of one problem share; it keeps the best of their ends."""
+
+    def __init__(
+        self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
+    ) -> None:
+        self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
+        self.subproblem = Subproblem(problem, workspace.state)
+        self.lineariser = problem.lineariser(workspace)
+        self.trace: list[TraceEntry] = []
+        self._shared = Run(self.subproblem, self.lineariser, solver, self.trace, control)
+        self.spent = 0  # iterations
+        self.how = "directly"
+        self._first: int | None = None  # programs of the first attempt, once it is made
+        self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
+        self._missed = 0.0  # goals' residual with which a search ends, metres
+        self._best: LocalSolution | None = None
+
+    @property
+    def best(self) -> LocalSolution:
+        """The best posture so far."""
+        assert self._best is not None
+        return self._best
+
+    @property
+    def _left(self) -> int:
+        """Programs that attempts after the first may still solve."""
+        return self.settings.budget - (0 if self._first is None else len(self.trace) - self._first)
+
+    def _at_most(self, programs: int) -> int:
+        """The smaller of this number of programs and that of one descent."""
+        return min(programs, self.settings.iterations)
+
+    def directly(self, start: Array) -> LocalSolution:
+        """A descent; without measures by whole steps as long as these gain much."""
+        return self._ran(self._descent(self.settings.iterations, None, "", full_step=not self.settings.measures), start)
+
+    def feasibility_first(self, start: Array) -> LocalSolution | None:
+        """Find a feasible posture without measures, and descend from there; None where the goals are out of reach."""
+        local = self._through_things(start, "feasibility")
+        if local is None or local.violation.worst > self.settings.tolerance or not self.settings.measures:
+            return local
+        self._accept(local, "by feasibility first")
+        return self._descend(local.q)
+
+    def _through_things(self, start: Array, note: str) -> LocalSolution | None:
+        """Feasibility with pairs relaxed by a depth, then with the true clearances; None where out of reach."""
+        most, relaxed = self._at_most(SEARCH.probe_programs), self.lineariser.relaxed(SEARCH.start_depth)
+        through = self._ran(self._feasibility(relaxed, most, note), start)
+        if through.violation.worst > SEARCH.reached * self.settings.tolerance:
+            return None
+        return self._ran(self._feasibility(self.lineariser, most, note), through.q)
+
+    def _probe(self, start: Array, depth: float) -> LocalSolution:
+        """Test by few programs whether the goals can be met from a start, pieces inside each other by a depth [m]."""
+        most = max(min(self._left, SEARCH.probe_programs), 1)
+        lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
+        return self._ran(self._feasibility(lineariser, most, "probe"), start)
+
+    def _descend(
+        self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
+    ) -> LocalSolution:
+        """Descend from a start; restore constraints that are violated at its end."""
+        iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
+        local = self._ran(self._descent(iterations, None, note, measures=measures, full_step=full_step), start)
+        if (most is None or local.iterations < most) and not held(local, self.settings.tolerance):
+            stayed = self._stay(local)
+            local = stayed if better(stayed, local, self.settings) else local
+        return local
+
+    def _stay(self, local: LocalSolution) -> LocalSolution:
+        """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
+        nearest = self.lineariser.at(local.q, 0.0).goal_error
+        most = self._at_most(SEARCH.staying) if held(local, self.settings.tolerance) else self.settings.iterations
+        stayed = self._ran(self._descent(most, nearest, "nearest"), local.q)
+        left = float(np.linalg.norm(self.lineariser.at(stayed.q, 0.0).goal_error))
+        violation = with_values(stayed.violation, goal=left, left=left)
+        return with_values(stayed, violation=violation, converged=local.converged)
+
+    def _descent(
+        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
+        tolerance: float | None = None,
+    ) -> SQP:  # fmt: skip
+        tolerance, measures = tolerance or self.settings.tolerance, measures and self.settings.measures
+        return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
+
+    def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
+        shared = with_values(self._shared, lineariser=lineariser)
+        return Feasibility(shared, self.settings.tolerance, most, note, figure=self.problem.scene.figure)
+
+    def _closest(self) -> Closest:
+        return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)
+
+    def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
+        """The end of a stage from a posture (nq,), whose iterations count."""
+        self.spent += (local := stage.run(start)).iterations
+        if self._near is None or local.violation.total < self._near.violation.total:
+            self._near = local
+        return local
+
+    def _accept(self, local: LocalSolution, how: str) -> bool:
+        """Keep the better one; whether the problem is solved now."""
+        if self._best is None or better(local, self._best, self.settings):
+            self._best, self.how = local, how
+        return self._ends(self.best)
+
+    def _ends(self, local: LocalSolution, share: float = 1.0) -> bool:
+        """Whether a search is over at this end, with the constraints and goals missed by `share` tolerances at most."""
+        enough = share * self.settings.tolerance
+        return broken(local) <= enough and local.violation.left <= self._missed + enough
