@@ -108,9 +108,7 @@ def test_a_joint_that_turns_back_on_the_way_moves_evenly_though_no_two_postures_
     np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
 
 
-def test_a_path_round_a_ball_is_drawn_tight(
-    free_bodies: Callable[..., wb.Figure], least_distance: Distance
-) -> None:
+def test_a_path_round_a_ball_is_drawn_tight(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:
     """The shortest one consists of two tangents and an arc, along which nothing turns."""
     figure, far, around = free_bodies(wb.Sphere(0.1)), 1.0, 0.4
     scene = wb.Scene(figure).add(wb.Sphere(around - 0.1), name="ball")
