@@ -188,3 +188,14 @@ def test_more_time_buys_a_lower_minimum() -> None:
     bought = wb.solve(problem, replace(ONE_START, restarts_for_measure=1, time_limit=60.0))
     assert first.status == bought.status == "solved"
     assert bought.assessment.measure < 0.7 * first.assessment.measure
+
+
+@pytest.mark.parametrize("number", [13, 17])
+def test_more_descents_lead_no_higher_than_fewer(number: int) -> None:
+    """What leads around things unasked is tried beside what was asked for, not in its place."""
+    from wholebody.bench.suite.problem_sets.registry import problem_set
+
+    problem = problem_set("passage").make(number, 200).problem
+    fewer, more = (wb.solve(problem, wb.methods.QP(restarts_for_measure=count)) for count in (0, 1))
+    assert fewer.status == more.status == "solved"
+    assert more.assessment.measure <= fewer.assessment.measure * 1.0001

@@ -225,29 +225,31 @@ class Multistart(Search):
             self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _starts_for_measure(self, count: int) -> Iterable[Array]:
-        """For `count` minima the start and random postures (nq,); for none two that lead around things."""
-        here, tolerance, most = self._start, self.settings.tolerance, self._at_most(SEARCH.probe_programs)
-        if count:
-            rng = np.random.default_rng([self.settings.seed, count])
-            return chain([here], restarts(self.problem, self.lineariser.state, here, rng, SEARCH.screened * count - 1))
+    def _around_things(self) -> list[Array]:
+        """Two starts (nq,) that lead around things where these make the measures dear; else none."""
+        tolerance, most = self.settings.tolerance, self._at_most(SEARCH.probe_programs)
         if not self.settings.restarts or self.best.measure <= SEARCH.dear * self._through_measure:
             return []
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         through = self._ran(SQP(alone, tolerance, most, "through things"), self.best.q)
         dear = through.violation.worst <= tolerance and self.best.measure > SEARCH.dear * through.measure
-        return [through.q, here] if dear else []
+        return [through.q, self._start] if dear else []
 
     def _seek_lower(self, count: int) -> None:
-        """Where all is met, seek `count` lower minima, or one, from the best of feasible postures of few programs."""
+        """Where all is met, seek `count` lower minima, and one around things, from the best of feasible postures."""
         tolerance, found = self.settings.tolerance, list[LocalSolution]()
         if not self.settings.measures or self.best.violation.worst > tolerance:
             return
-        for q in self._starts_for_measure(count):
+        starts, rng = self._around_things(), np.random.default_rng([self.settings.seed, count])
+        most = count + bool(starts)
+        if count:
+            given = self.problem, self.lineariser.state, self._start, rng, SEARCH.screened * count - 1
+            starts = [*(starts or [self._start]), *restarts(*given)]
+        for q in starts:
             local = None if self.control.over else self._through_things(q, "for measure")
             if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
-        for local in sorted(found, key=lambda each: each.measure)[: max(count, 1)]:
+        for local in sorted(found, key=lambda each: each.measure)[:most]:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _find_closest(self) -> None:
