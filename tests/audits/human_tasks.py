@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tests.measuring import measure
 from wholebody.base.arrays import Array
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ KEPT = -1e-3
 
 ON_SEAT = 0.01
 """Metres above a seat up to which a point of pelvis or thighs rests on it: flesh yields by as much."""
+
+BEHIND_KNEE = 0.035
+"""Metres that a seat ends behind the hollow of the knee: ESTIMATE."""
 
 LEG = 0.04
 """Thickness of the legs of stool and desk, metres."""
@@ -170,21 +174,21 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
 _SIDES = (("left", 1.0), ("right", -1.0))
 
 
-def _underside(figure: Figure) -> float:
+def _underside(figure: Figure, sizes: Mapping[str, float]) -> float:
     """Height of the lowest point of pelvis and thighs below the pelvis' frame, thighs level, negative."""
-    from tests.measuring import measure
-
-    sizes = measure(figure)
     q = figure.with_joints(figure.neutral, {})
     vertex = figure.placement(q, "head_top").translation[2] - figure.placement(q, "pelvis").translation[2]
     return float(vertex - sizes["sitting_height"])
 
 
 def add_seat(scene: Scene, figure: Figure, q: Array) -> float:
-    """Put a stool below who sits; return the height of its top."""
-    pelvis = figure.placement(q, "pelvis").translation
-    top = float(pelvis[2]) + _underside(figure) - 0.001
-    _add_on_legs(scene, "seat", (0.42, 0.5, 0.04), (float(pelvis[0]) + 0.10, 0.0, top - 0.02))
+    """Put a stool below who sits, no deeper than the thighs are long; return the height of its top."""
+    sizes, pelvis = measure(figure), figure.placement(q, "pelvis").translation
+    top = float(pelvis[2]) + _underside(figure, sizes) - 0.001
+    shank = sizes["buttock_knee_length"] - sizes["buttock_popliteal_length"]
+    hollow = float(figure.placement(q, "right_knee").translation[0]) - 0.5 * shank  # of the knee
+    back, front = float(pelvis[0]) - 0.11, min(float(pelvis[0]) + 0.31, hollow - BEHIND_KNEE)
+    _add_on_legs(scene, "seat", (front - back, 0.5, 0.04), (0.5 * (front + back), 0.0, top - 0.02))
     return top
 
 

@@ -8,6 +8,7 @@ import wholebody as wb
 from tests.audits import human_postures
 from tests.audits.human_contacts import distance
 from tests.audits.human_sizes import ranges
+from tests.audits.human_tasks import add_seat
 from wholebody.figures import load
 
 
@@ -27,6 +28,17 @@ def test_distances_are_those_of_the_scene() -> None:
     owners = [{scene.piece_owner[int(k)] for k in pair} for pair in contacts.pair]
     tested = min(d for d, pair in zip(contacts.distance, owners, strict=True) if pair == {"left_hand", "left_thigh"})
     assert distance(figure, q, ["left_hand"], ["left_thigh"]) == pytest.approx(tested, abs=1e-6)
+
+
+@pytest.mark.parametrize(("sex", "percentile"), [("female", 3), ("male", 97)])
+def test_a_stool_is_no_deeper_than_the_thighs_of_who_sits_on_it(sex: str, percentile: int) -> None:
+    figure = load("human", sex=sex, percentile=percentile)
+    q, scene = figure.posture("sitting"), wb.Scene(figure)
+    add_seat(scene, figure, q)
+    seat = {k for k, owner in enumerate(scene.piece_owner) if owner.startswith("seat")}
+    contacts = scene.contacts(q, within=1.0)
+    met = zip(contacts.distance.tolist(), contacts.pair.tolist(), strict=True)
+    assert min(distance for distance, pair in met if seat & set(pair)) > -1e-6
 
 
 def test_published_postures_are_numbers_with_sources() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.methods.starts import Minima, restarts, throughout
+from wholebody.methods.starts import Minima, alike, restarts, throughout
 
 
 def descents_needed(values, fewest: int = 0) -> int:
@@ -19,6 +19,19 @@ def descents_needed(values, fewest: int = 0) -> int:
         if minima.complete:
             return count
     return -1
+
+
+@pytest.mark.parametrize(
+    ("ends", "told"),
+    [
+        ([1.0, 1.05], False),
+        ([1.0, 1.05, 1.09], True),
+        ([1.0, 1.05, 1.2, 1.09], True),
+        ([1.0, 1.2, 1.2, 1.2], False),  # the nearest stands alone
+    ],
+)
+def test_three_ends_that_are_the_nearest_and_equally_near_are_alike(ends: list[float], told: bool) -> None:
+    assert alike(ends) is told
 
 
 @pytest.mark.parametrize(("known", "needed"), [(1, 7), (2, 16), (3, 29)])

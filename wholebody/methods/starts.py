@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -93,6 +93,11 @@ def all_found(found: int, count: int, fewest: int = 0) -> bool:
     """Whether so many different minima count as all there are, after so many descents; see `Minima`."""
     enough = count >= max(fewest, found + 3)
     return enough and found * (count - 1) <= (found + 0.5) * (count - found - 2)
+
+
+def alike(ends: Sequence[float]) -> bool:
+    """Whether three ends of descents are the least and equally far from the goals: others are no nearer."""
+    return len(ends) >= 3 and sorted(ends)[2] <= 1.1 * min(ends)
 
 
 def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:

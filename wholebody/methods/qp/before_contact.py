@@ -20,7 +20,7 @@ from wholebody.figures.state import State
 from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.iterates import LocalSolution, Run
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.starts import restarts
+from wholebody.methods.starts import alike, restarts
 from wholebody.problem import Problem
 from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.contact_parts import Gap, Near, approached, has_face
@@ -64,11 +64,9 @@ def before_contact(
         else:
             missed.append(local)
             ends.append(local.violation.total)
-        # three ends that are the least and equally far: the goals are out of reach, and others are no nearer
-        alike = sum(end <= 1.1 * min(ends) for end in ends) >= 3
-        if alike or shared.control.over or len(shared.trace) >= most:
+        if alike(ends) or shared.control.over or len(shared.trace) >= most:
             break
-    if missed and not alike:
+    if missed and not alike(ends):
         nearest = min(missed, key=lambda each: each.violation.total)
         yield with_values(nearest, iterations=sum(each.iterations for each in missed))
 

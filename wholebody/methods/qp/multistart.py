@@ -22,7 +22,7 @@ from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.starts import Minima, hooked_hands, restarts, throughout
+from wholebody.methods.starts import Minima, alike, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Effort
@@ -40,6 +40,7 @@ class Multistart(Search):
         self._start = problem.scene.figure.clamp(problem.start)
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
+        self._in_contact: list[float] = []  # violations where descents from before contact ended
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self.out_of_reach = False  # as it seems
 
@@ -71,7 +72,7 @@ class Multistart(Search):
                 local = attempt.stage(q)
                 if local is not None and self._accept(local, attempt.how or self.how):
                     return
-                enough = self._minima.complete or self._relaxed_minima.complete
+                enough = self._minima.complete or self._relaxed_minima.complete or alike(self._in_contact)
                 if enough or self.control.over or self._left < 0 or self._proven():
                     return
 
@@ -93,7 +94,7 @@ class Multistart(Search):
         """Those in which measures do not count."""
         start, least, tried = self._start, self._least, self.tried
         self._first = len(self.trace)
-        yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
+        yield Attempt(self._before_contact(), self._into_contact, "from before contact")
         yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
         self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
@@ -147,6 +148,13 @@ class Multistart(Search):
         for away in rng.normal(0.0, SEARCH.displaced, (count, len(self.subproblem.terms.share))):
             descent = self._descent(most, away, "beside the goals", measures=False, full_step=True)
             yield self._ran(descent, self._start).q
+
+    def _into_contact(self, start: Array) -> LocalSolution:
+        """A descent from before contact; where three end alike, the search ends."""
+        local = self._descend(start, full_step=True)
+        if local.converged and held(local, self.settings.tolerance):
+            self._in_contact.append(local.violation.total)
+        return local
 
     def _before_contact(self, grips: bool = False) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
