@@ -213,3 +213,17 @@ def test_penetration_between_figures_is_that_of_coal(alone: dict[str, wb.Figure]
 def _overlaps(scene: wb.Scene, q: np.ndarray) -> tuple[list[list[int]], np.ndarray]:
     near = scene.contacts(q, 0.0)
     return near.pair.tolist(), near.distance
+
+
+def test_a_link_may_have_the_name_of_its_joint(tmp_path: Path) -> None:
+    """So it is in files of Nao. Links 0.2 m beside their joints are where they are alone."""
+    text = FOLLOWING.replace('"left"', '"close"').replace('xyz="0 1 0"/>', 'xyz="0 1 0"/><origin xyz="0.2 0 0"/>')
+    (tmp_path / "one.urdf").write_text(text)
+    one = wb.load(tmp_path / "one.urdf")
+    both = join({"a": one, "b": (one, (1.0, 0.0, 0.0))})
+    q = both.with_joints(both.posture("neutral"), {"a/close": 0.03, "b/close": 0.01})
+    for name, place in (("a/close", (0.2, 0.03, 0.0)), ("b/close", (1.2, 0.01, 0.0))):
+        np.testing.assert_allclose(both.placement(q, name).translation, place, atol=1e-12)
+    kinds = [(frame.name, str(frame.type)) for frame in both.model.frames]
+    assert len(set(kinds)) == len(kinds)
+    assert {("a/close", "JOINT"), ("a/close", "BODY")} <= set(kinds)

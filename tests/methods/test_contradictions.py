@@ -80,7 +80,7 @@ def test_goals_against_holds_and_against_each_other(standing):
 
 def test_unreachable_says_that_everything_holds(standing):
     """One of two goals is missed for certain; whether the hold is kept is another question."""
-    foot = wb.Hold("left_foot", (0.6, 0.3, 0.9), orientation=False)
+    foot = wb.Hold("left_foot", (0.6, 0.3, 2.9), orientation=False)
     goals = [wb.Point("right_index_tip", (0.3, -0.2, 1.6)), wb.Point("right_index_tip", (0.3, -0.2, 1.7))]
     problem = standing(goals=goals, constraints=[foot])
     assert [entry.status for entry in found(problem)] == ["unreachable"]

@@ -113,7 +113,7 @@ def recorded(shared_data: Path) -> wb.Clip:
 def _with_a_ball(recorded: wb.Clip) -> wb.Scene:
     """A ball where the right hand passes."""
     palm = recorded.figure.placement(recorded.q[12], "right_palm").translation
-    return wb.Scene(recorded.figure).add(wb.Sphere(0.03), name="ball", at=tuple(palm + (0.03, 0.0, 0.0)))
+    return wb.Scene(recorded.figure).add(wb.Sphere(0.03), name="ball", at=tuple(palm + (0.02, 0.0, 0.0)))
 
 
 def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> None:

@@ -20,7 +20,7 @@ from wholebody.geometry.large_models import geometry_model, pairs_of
 from wholebody.geometry.proximity import PairTable, Proximity
 
 TOUCHING = 1e-3  # m: what is mounted and its carrier are not tested against each other where they start this near
-
+OF_LINK = " (link)"  # after the name of a link, while models are joined
 
 Parts: TypeAlias = tuple[pin.Model, pin.GeometryModel, Description, pin.GeometryModel | None]
 
@@ -83,6 +83,15 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
     return model, _geometry(parts, [tested]), description, _visual(parts)
 
 
+def _told_apart(model: pin.Model) -> pin.Model:
+    """A copy in which no link has the name of a joint, which Pinocchio refuses to append."""
+    result = pin.Model(model)
+    for one in list(result.frames)[1:]:
+        if one.type == pin.FrameType.BODY:
+            one.name += OF_LINK
+    return result
+
+
 def _with(model: pin.Model, figure: Articulated, prefix: str, frame: int, at: pin.SE3) -> tuple[pin.Model, _Part]:
     """A model with a figure's joints on a frame of it too, and the figure as a part of it."""
     own = pin.Model(figure.model)
@@ -92,7 +101,7 @@ def _with(model: pin.Model, figure: Articulated, prefix: str, frame: int, at: pi
         own.frames[k].name = prefix + own.frames[k].name
     seat, carrier = model.frames[frame], int(model.frames[frame].parentJoint)
     world = seat.placement * at
-    made = pin.appendModel(model, own, frame, at)
+    made = pin.appendModel(_told_apart(model), own := _told_apart(own), frame, at)
     joints = (carrier, *(made.getJointId(name) for name in list(own.names)[1:]))
     # of a reduced figure Pinocchio puts the masses of what was locked to the wrong places
     for k in range(1, model.njoints):
@@ -102,6 +111,8 @@ def _with(model: pin.Model, figure: Articulated, prefix: str, frame: int, at: pi
     seated = made.getJointId(model.names[carrier])
     made.inertias[seated] = model.inertias[carrier] + world.act(own.inertias[0])
     frames = (frame, *(made.getFrameId(one.name, one.type) for one in list(own.frames)[1:]))
+    for one in made.frames:
+        one.name = one.name.removesuffix(OF_LINK)
     return made, _Part(figure, (seated, *joints[1:]), frames, world, prefix)
 
 

@@ -266,12 +266,10 @@ def _centres(meeting: Mapping[str, list[int]], real: Array, axes: Array) -> dict
     limbs = [[f"{side}_{part}" for part in parts[:3]] for parts in LIMBS for side in ("left", "right")]
     for start, middle, end in (limb for limb in limbs if limb[1] in hinges):
         swing = hinges[middle]
-        beside = start in meeting and bool(
-            abs(axes[meeting[start][-1]] @ swing) > 0.99
-        )  # nothing says how far a leg is out
-        known = [
-            role for role in (start, end) if role in meeting and role not in hinges and not (role == start and beside)
-        ]
+        # nothing says how far out such a leg is
+        beside = bool(start in meeting and abs(axes[meeting[start][-1]] @ swing) > 0.99)
+        ends = (end,) if beside else (start, end)
+        known = [role for role in ends if role in meeting and role not in hinges]
         if known:
             found[middle] += swing * (swing @ (np.mean([found[role] for role in known], axis=0) - found[middle]))
         hung = [start] * beside + [role for role in (end,) if role in hinges and abs(hinges[role] @ swing) > 0.99]

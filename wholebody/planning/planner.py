@@ -261,10 +261,8 @@ class _Search:
                     best = tighten(model, best, self._local, self._slides)
             return best, f"the shortest of {runs} searches"
         if not self._reached:
-            none = (
-                "meets the goals" if BUDGET.spent < SEARCHED else "that meets the goals was found within the time limit"
-            )
-            return None, f"no posture {none}: {self._said}"
+            late = "" if BUDGET.spent < SEARCHED else " was found in time that"
+            return None, f"no posture{late} meets the goals: {self._said}"
         return None, "no motion was found within the time limit"
 
     def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
