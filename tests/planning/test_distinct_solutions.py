@@ -165,3 +165,19 @@ def test_the_first_descent_begins_however_little_time_is_left(arm: wb.Figure) ->
     problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (0.5, 0.2, 0.5))])
     found = wb.solutions(problem, time_limit=1e-9)
     assert found.starts == 1
+
+
+def test_a_search_tells_how_far_it_is_and_can_be_ended(arm: wb.Figure, capsys: pytest.CaptureFixture[str]) -> None:
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (0.4, 0.3, 0.5))])
+    calls = list[tuple[int, int]]()
+
+    def third(begun: int, most: int) -> bool:
+        calls.append((begun, most))
+        return begun == 3
+
+    assert wb.solutions(problem, starts=20, progress=third).starts == 3
+    assert calls == [(1, 20), (2, 20), (3, 20)]
+    wb.solutions(problem, starts=2, progress=True)
+    assert "2 of 2" in capsys.readouterr().err
+    with pytest.raises(wb.InputError, match="solutions: progress"):
+        wb.solutions(problem, progress=3)  # type: ignore[arg-type]

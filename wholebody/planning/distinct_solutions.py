@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import overload
@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.batches import reporter
 from wholebody.methods.base import TIME_LIMIT, check_problem
 from wholebody.methods.contradictions import contradictions
 from wholebody.methods.qp.chain import closed_form_postures
@@ -76,6 +77,7 @@ def solutions(
     starts: int = 300,
     seed: int = 0,
     time_limit: float | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> Solutions:
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
@@ -92,6 +94,8 @@ def solutions(
         starts: most descents.
         seed: of the random postures.
         time_limit: seconds after which it ends, the last descent too; the first always begins. None for no limit.
+        progress: called after each descent with the number of descents and the most there will be; the search ends if
+            it returns True. True prints a line.
 
     Raises:
         InputError: a value of the wrong kind or out of range, or the scene changed after the problem was stated.
@@ -104,6 +108,7 @@ def solutions(
     starts = checks.whole(starts, "solutions: starts", 1, 100_000)
     apart = checks.number(apart, "solutions: apart", 1e-6, 100.0, "rad or m")
     seed = checks.whole(seed, "solutions: seed", 0, 2**32 - 1)
+    told = reporter(progress, "solutions: progress")
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     with problem.borrow() as workspace:
         if contradictions(problem, workspace):
@@ -111,6 +116,7 @@ def solutions(
     known: list[Solution] = []
     begun = descents = 0
     branches, complete = _branches(problem), False
+    total = starts if branches is None else min(starts, len(branches))
     for start in _starts(problem, starts, seed) if branches is None else branches[:starts]:
         left = ends - time.perf_counter()
         if left <= 0.0 and begun:
@@ -124,7 +130,7 @@ def solutions(
             known = _with(problem, known, answer, apart)
         # After 12 descents minima at limits, which few starts lead to, were missed.
         complete = all_found(len(known), descents, 40) if branches is None else begun == len(branches)
-        if complete:
+        if (told is not None and told(begun, total) is True) or complete:
             break
     complete = complete and _stand_alone(problem, [answer.q for answer in known])
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
