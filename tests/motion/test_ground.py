@@ -216,11 +216,9 @@ def test_speed_limits_hold() -> None:
     assert np.abs(clip.velocities()[:, 6:]).max() < 3.0 * (1.0 + 1e-3)
 
 
-def test_frames_without_room_are_told_and_their_programs_stay_small(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    figure = robot(tmp_path)  # of few pieces
-    low = wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 0.5))
+@pytest.fixture
+def program_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many bounds and rows each program of retargeting has."""
     rows, solve = list[int](), posture_fit.daqp.solve
 
     def counted(*program: Any, **settings: Any) -> Any:
@@ -228,28 +226,27 @@ def test_frames_without_room_are_told_and_their_programs_stay_small(
         return solve(*program, **settings)
 
     monkeypatch.setattr(posture_fit.daqp, "solve", counted)
+    return rows
+
+
+def test_frames_without_room_are_told_and_their_programs_stay_small(tmp_path: Path, program_rows: list[int]) -> None:
+    figure = robot(tmp_path)  # of few pieces
+    low = wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 0.5))
     with pytest.warns(UserWarning, match="3 of 3 frames overlap") as told:
         clip = wb.retarget(walker(flat, 0.1)[0], figure, low)
     check = wb.check(clip, low)
     assert (check.depth > 2e-3).all()
     assert any(f"by {1e3 * check.deepest:.0f} mm" in str(one.message) for one in told)
     # those of ways between frames that both overlap came to ten times as many
-    assert max(rows) < len(low.geometry.collisionPairs)
+    assert max(program_rows) < len(low.geometry.collisionPairs)
 
 
-def test_programs_of_many_pieces_without_room_stay_small(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_programs_of_many_pieces_without_room_stay_small(program_rows: list[int]) -> None:
     """Its 39 spheres are all inside the floor or the ceiling: a program of their hundreds of rows took a second."""
     person = wb.load("human", detail="spheres")
     low = wb.Scene(person).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 1.0))
-    rows, solve = list[int](), posture_fit.daqp.solve
-
-    def counted(*program: Any, **settings: Any) -> Any:
-        rows.append(len(program[2]))
-        return solve(*program, **settings)
-
-    monkeypatch.setattr(posture_fit.daqp, "solve", counted)
     wb.retarget(walker(flat, 0.1)[0], person, low)
-    assert max(rows) <= person.model.nv + len(person.cones)
+    assert max(program_rows) <= person.model.nv + len(person.cones)
 
 
 def test_feet_that_are_held_inside_the_floor_are_told_before(human: wb.Figure) -> None:
@@ -280,7 +277,9 @@ def test_what_is_frozen_inside_things_or_the_body_is_told_before(frozen: str, hu
         q[2:, joint.idx_q] = human.model.lowerPositionLimit[joint.idx_q]
         terms, said = wb.Freeze(*human.joints), r"left_\w+ is frozen .* inside \w+ \(first in frame 2\)"
     with pytest.warns(UserWarning, match=said):
-        wb.avoid(wb.Clip(human, q, DT), scene, constraints=[terms], progress=lambda _: True)
+        left = wb.avoid(wb.Clip(human, q, DT), scene, constraints=[terms], progress=lambda _: True).report
+    assert not left.solved
+    assert not left.before.free
 
 
 def test_what_feet_and_hands_carry_into_things_is_told_before(human: wb.Figure) -> None:

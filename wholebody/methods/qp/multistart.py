@@ -287,7 +287,7 @@ class Multistart(Search):
         tolerance, near = self.settings.tolerance, self._near
         if near is not None and (self.out_of_reach or self._least):  # else other starts were tried
             self._missed = SEARCH.agree * near.violation.left
-            self._minima, self._relaxed_minima = Minima(), Minima()
+            self._minima, self._relaxed_minima, self._in_contact = Minima(), Minima(), []
             self._search(self._from_elsewhere(self.settings.restarts))
             self._accept(self._ran(self._closest(), self.best.q), self.how)
         if not held(self.best, tolerance) and not self.control.over:
