@@ -13,6 +13,7 @@ from wholebody.tracking.overlaps import overlaps
 from wholebody.view import Viewer
 from wholebody.view.composition import Composition, legend
 from wholebody.view.scene_graph import SceneGraph
+from wholebody.view.style import LOOK
 
 
 def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm: Any) -> None:
@@ -76,3 +77,19 @@ def test_an_arrow_begins_outside_of_both_that_overlap(planar_arm: Any) -> None:
     arrow = next(place for marker, place in markers.values() if marker.kind == "arrow")
     words = next(place for marker, place in markers.values() if marker.kind == "label")
     assert words[:3, 3] == pytest.approx(arrow[:3, 3] + arrow[:3, 2])  # at its end, where they hide nothing
+
+
+def test_what_touches_may_be_a_thing_that_is_carried(planar_arm: Any) -> None:
+    """A brush on an arm and a ceiling over it: as a goal, and as a constraint that is in the way of another goal."""
+    scene = wb.Scene(planar_arm((0.5, 0.4))).add(wb.Box((4.0, 0.1, 1.0)), name="ceiling", at=(0.0, 0.7, 0.0))
+    scene.attach(wb.Sphere(0.05), to="tip", name="brush", at=(0.1, 0.0, 0.0))
+    touch = wb.Touch("brush", "ceiling")
+    reach = wb.Problem(scene, np.full(2, 0.3), goals=[touch])
+    q = wb.solve(reach).q
+    kept = wb.Problem(scene, q, goals=[wb.Posture(np.zeros(2))], constraints=[touch])
+    found = [one for one in wb.assess(kept, q).blockers if one.kind == "constraint"]
+    assert len(found) == 1
+    viewed = Composition(scene, SceneGraph(), -1.0, (), False)
+    viewed.keyframe(q, reach)
+    ball = viewed.keyframe(q, kept, found).markers[f"{LOOK.blocker_node}/0/ball"][1]
+    assert ball[1, 3] == pytest.approx(0.65 - 0.05, abs=1e-5)  # the middle of the brush, under the ceiling

@@ -15,7 +15,7 @@ from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
-from wholebody.view.viewed_scene import ViewedScene
+from wholebody.view.viewed_scene import ViewedScene, place_of
 
 if TYPE_CHECKING:
     from wholebody.tracking.overlaps import Overlap
@@ -131,10 +131,6 @@ def _place(scene: ViewedScene, state: State, contacts: Any, blocker: Any) -> Arr
                 return np.asarray(0.5 * (contacts.point_a[row] + contacts.point_b[row]))
         return None
     if blocker.kind == "constraint":
-        frame = blocker.frame
-        if frame is None:
-            return None
-        frame_id = scene.model.getFrameId(frame)
-        joint = scene.model.frames[frame_id].parentJoint
-        return np.array(state.data.oMi[joint].act(scene.model.frames[frame_id].placement.translation))
+        place = place_of(scene, state, blocker.frame or "")
+        return None if place is None else np.array(place.translation)
     return np.array(state.data.oMi[scene.model.getJointId(blocker.names[0])].translation)

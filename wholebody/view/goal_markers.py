@@ -17,7 +17,7 @@ from wholebody.geometry.placement import placement
 from wholebody.view import drawing
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
-from wholebody.view.viewed_scene import ViewedScene
+from wholebody.view.viewed_scene import ViewedScene, place_of
 
 FARTHEST_LOOK = 1.0
 """Metres: what an axis is turned to is not drawn, and not kept in the picture, if it is farther from the frame."""
@@ -70,9 +70,9 @@ class Goals:
         """Placement of the goal's frame; None for a goal without a position."""
         name = getattr(goal, "frame", None)
         if isinstance(name, str):
-            here = state.frame(self.scene.figure.frame_id(name)).copy()
-            offset = np.asarray(getattr(goal, "offset", (0.0, 0.0, 0.0)), dtype=float)
-            here.translation = here.act(offset)
+            here = place_of(self.scene, state, name)
+            if here is not None:
+                here.translation = here.act(np.asarray(getattr(goal, "offset", (0.0, 0.0, 0.0)), dtype=float))
             return here
         if hasattr(goal, "axes") and hasattr(goal, "target"):
             return pin.SE3(np.eye(3), state.center_of_mass())

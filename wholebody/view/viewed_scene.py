@@ -13,6 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a
 from wholebody.base.errors import InputError
+from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_obstacles import MovingScene
@@ -103,6 +104,17 @@ class ViewedWorld:
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Pairs nearer than `within` metres in a configuration (nq,), nearest first."""
         return self._workspace.near(np.asarray(q, dtype=float), within).nearest_first()
+
+
+def place_of(scene: ViewedScene, state: State, name: str) -> pin.SE3 | None:
+    """Placement of what a term is about: a frame's, or that of a piece of a thing or segment; None for another name."""
+    model = scene.model
+    if model.existFrame(name):
+        return state.frame(model.getFrameId(name)).copy()
+    for piece, owner in zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True):
+        if name in (owner, piece.name):
+            return state.data.oMi[piece.parentJoint] * piece.placement
+    return None
 
 
 ViewedScene: TypeAlias = Scene | ViewedAssembly | ViewedWorld
