@@ -13,7 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import wholebody as wb
+from wholebody.cli import main
 from wholebody.figures.figure import Figure
+from wholebody.motion.files.archive import made_with
 
 SYMMETRIC = ("shoulder", "elbow", "wrist", "palm", "hip", "knee", "ankle", "toe_tip")
 
@@ -221,3 +223,29 @@ def test_a_damaged_archive_is_one_sentence_or_a_clip(
         said = str(error)
     assert "damaged.npz" in said
     assert "\n" not in said
+
+
+def test_a_clip_is_read_on_the_figure_that_it_was_made_with(human: Figure, tmp_path: Path) -> None:
+    """On legs of another length its feet would leave the ground, or be in it."""
+    woman = wb.load("human", sex="female", percentile=5)
+    clip = moving(woman, 3)
+    archive, scene = clip.write(tmp_path / "walk.npz"), clip.write(tmp_path / "walk.glb")
+    with pytest.raises(wb.FileFormatError, match=r"walk\.npz: is of another size of human: .* mm from .*female"):
+        wb.read_clip(archive, human)
+    again = made_with(archive)
+    assert again is not None
+    assert wb.read_clip(archive, again).q == pytest.approx(clip.q, abs=1e-15)
+    heavier = wb.load("human", sex="female", percentile=5, clothing=0.01)  # the same joints
+    assert wb.read_clip(archive, heavier).q == pytest.approx(clip.q, abs=1e-15)
+    assert wb.read_clip(scene, woman).q == pytest.approx(clip.q, abs=1e-6)
+    assert np.abs(wb.read_clip(scene, human).q - clip.q).max() > 0.01  # retargeted, as any other skeleton
+
+
+def test_commands_take_the_figure_of_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = moving(wb.load("human", sex="female", percentile=5), 3).write(tmp_path / "walk.npz")
+    assert main(["clip", "convert", str(path), str(tmp_path / "again.npz")]) == 0
+    again = made_with(tmp_path / "again.npz")
+    assert again is not None
+    assert again.loaded_as == ("human", {"sex": "female", "percentile": 5})
+    assert main(["clip", "info", str(path), "--sex", "male"]) == 2
+    assert "another size" in capsys.readouterr().err

@@ -9,6 +9,7 @@ from wholebody.base.errors import FileFormatError, InputError
 from wholebody.cli.arguments import person_options
 from wholebody.figures import Figure, load
 from wholebody.motion.clip import Clip
+from wholebody.motion.files.archive import made_with
 from wholebody.motion.reading import read_clip, read_skeleton
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.scene.scene import Scene
@@ -16,9 +17,13 @@ from wholebody.taskfile import read_task
 
 
 def figure_of(arguments: argparse.Namespace) -> Figure:
-    """Load the figure."""
+    """Load the figure; where none is stated, the person that the first file was made with."""
     root = {} if arguments.root is None else {"root": arguments.root}
-    return load(arguments.figure, **person_options(arguments), **root)
+    options = person_options(arguments) | root
+    if arguments.figure == "human" and not options:
+        first = arguments.files[0] if "files" in arguments else arguments.file
+        return made_with(first) or load("human")
+    return load(arguments.figure, **options)
 
 
 def scene_of(arguments: argparse.Namespace) -> Scene:

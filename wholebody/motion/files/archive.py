@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import tokenize
 import zipfile
@@ -14,20 +15,24 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
+from wholebody.base.errors import FileFormatError, UnknownNameError, WholebodyError, one_line
 from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
+from wholebody.figures.loading import load
 from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.thing_tracks import steady
 
 VERSION = 1  # of the layout of the arrays
+APART = 1e-3  # m: joints of one figure are as far from each other, but for what another version makes of a person
+PEOPLE = ("human", "avatar", "hand")  # figures that their options make anywhere
 
 
 def write(motion: Motion, path: Path) -> Path:
     """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`; see `_robot_arrays`.
 
+    `joint_places` (njoints, 3) has where each joint is on the one before it, `loaded_as` how `wb.load` made a person.
     Of things that move it has names, `things` (k,), and placements, `thing_placements` (k, n, 7).
     """
     data = io.BytesIO()
@@ -42,10 +47,37 @@ def write(motion: Motion, path: Path) -> Path:
         name=np.array(motion.name),
         joints=np.array(motion.figure.joints, dtype=np.str_),
         figure=np.array(motion.figure.name),
+        joint_places=_joint_places(motion.figure),
+        **_loaded_as(motion.figure),
         **moving,
         **_robot_arrays(motion),
     )
     return write_file(path, data.getvalue())
+
+
+def _joint_places(figure: Figure) -> NDArray[np.float64]:
+    return np.array([place.translation for place in figure.model.jointPlacements])
+
+
+def _loaded_as(figure: Figure) -> dict[str, Any]:
+    """How a person was made; nothing of other figures, or of options that are no plain values."""
+    if figure.loaded_as is None or figure.loaded_as[0] not in PEOPLE:
+        return {}
+    try:
+        return {"loaded_as": np.array(json.dumps(figure.loaded_as))}
+    except TypeError:
+        return {}
+
+
+def made_with(path: Path) -> Figure | None:
+    """The person that a clip was made with; None where the file, of any kind, does not say."""
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open("loaded_as.npy") as file:
+            told = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
+        spec, options = json.loads(str(told))
+        return load(spec, **options) if spec in PEOPLE else None
+    except (OSError, zipfile.BadZipFile, zlib.error, KeyError, ValueError, TypeError, WholebodyError):
+        return None  # `read` says what is wrong with the file
 
 
 def _robot_arrays(motion: Motion) -> dict[str, Any]:
@@ -90,7 +122,7 @@ def read(path: Path, figure: Figure) -> Frames:
     if "wholebody_clip" not in arrays:
         listed = ", ".join(one_line(name, 30) for name in list(arrays)[:6]) or "none"
         raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {listed}")
-    missing = [name for name in ("q", "dt", "name", "joints") if name not in arrays]
+    missing = [name for name in ("q", "dt", "name", "joints", "joint_places") if name not in arrays]
     if missing:
         raise FileFormatError(f"{path.name}: the arrays lack {', '.join(missing)}; write the clip anew")
     if arrays["wholebody_clip"].tolist() != VERSION:
@@ -106,9 +138,26 @@ def read(path: Path, figure: Figure) -> Frames:
         raise FileFormatError(
             f"{path.name}: {q.shape[1]} values a frame, and {figure.name} has {figure.model.nq}; load the figure {mend}"
         )
+    _check_places(path, arrays, figure)
     name = str(arrays["name"])
     name = name if name.strip() and name.isprintable() else title_of(path)
     return Frames(q.astype(np.float64, copy=False), float(dt), name, _things(path, arrays, len(q)))
+
+
+def _check_places(path: Path, arrays: dict[str, NDArray[np.generic]], figure: Figure) -> None:
+    """Refuse a clip of a figure of the same joints and another size: on this one its feet would leave the ground."""
+    places, here = arrays["joint_places"], _joint_places(figure)
+    if places.dtype.kind != "f" or places.shape != here.shape:
+        raise FileFormatError(f"{path.name}: joint_places do not fit the joints; write the clip anew")
+    apart = np.linalg.norm(places.astype(np.float64) - here, axis=1)
+    if np.all(apart <= APART):  # not of NaN
+        return
+    worst = int(np.argmax(np.nan_to_num(apart, nan=np.inf)))
+    told = f", {one_line(str(arrays['loaded_as']), 200)}" if "loaded_as" in arrays else ""
+    raise FileFormatError(
+        f"{path.name}: is of another size of {figure.name}: {figure.model.names[worst]} is {1e3 * apart[worst]:.0f} mm "
+        f"from where it is on this one; load the figure that the clip was made with{told}"
+    )
 
 
 def _things(path: Path, arrays: dict[str, NDArray[np.generic]], frames: int) -> dict[str, NDArray[np.float64]]:

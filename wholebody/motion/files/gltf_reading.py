@@ -19,7 +19,7 @@ from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.clip import MOST_FRAMES
 from wholebody.motion.files.base import Frames
 from wholebody.motion.files.gltf import JOINT
-from wholebody.motion.files.nodes import wrapped
+from wholebody.motion.files.nodes import OFF, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
 from wholebody.motion.structure import limb_pairs, recognised_unit
 
@@ -259,9 +259,12 @@ def own(animated: Animated, figure: Figure) -> Frames | None:
 
 
 def _values(made: Any, turned: Rotation, moved: Array, along: Array, ends: list[float]) -> Array | None:
-    """Values (n, nq) of a joint that turns and moves its frame; None of a kind that no own file has."""
+    """Values (n, nq) of a joint that turns and moves its frame; None of one elsewhere, or that no own file has."""
+    slides = made.nv == 6 or made.shortname() == "JointModelPlanar" or bool(np.linalg.norm(along[:3]) > 0.5)
+    if not slides and np.abs(moved).max(initial=0.0) > OFF:
+        return None  # of a figure of another size
     if made.nv == 1:
-        if np.linalg.norm(along[3:]) < 0.5:
+        if slides:
             return (moved @ along[:3])[:, None]
         angle, middle = turned.as_rotvec() @ along[3:], 0.5 * (ends[0] + ends[1])
         within = made.nq == 1 and ends[1] - ends[0] <= 2.0 * np.pi
