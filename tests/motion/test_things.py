@@ -256,9 +256,7 @@ def test_hands_stay_on_a_table_that_stands() -> None:
     off = gaps(wb.Clip(figure, held.q, held.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (8, 1))}), "right")
     assert np.abs(off[:, 0]).max() < 2e-3
     loose = wb.retarget(motion, figure, scene, ground=None)  # holds nothing, and is free all the same
-    off = gaps(
-        wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (8, 1))}), "right"
-    )
+    off = gaps(wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (8, 1))}), "right")
     assert off[:, 0].min() > 5e-3
 
 
