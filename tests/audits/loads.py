@@ -85,9 +85,9 @@ def report(measured: Sequence[Row], facts: Mapping[str, str]) -> str:
     about = (
         "Torques and balance of clips as they are, freed by `wb.avoid`, and freed by `wb.avoid(dynamics=True)`, of a "
         "person of median strength. Torque: the largest of any joint, in parts of its strength; beyond: by how much "
-        "the worst joint needs more than its strength or than its largest torque before. Outside: how far the zero moment "
-        "point is outside of the feet that stand, and in how many frames; farther: by how much more than in the same "
-        "frame before. Colliding are frames, dips motions between free ones."
+        "the worst joint needs more than its strength or than its largest torque before. Outside: how far the zero "
+        "moment point is outside of the feet that stand, and in how many frames; farther: by how much more than in the "
+        "same frame before. Colliding are frames, dips motions between free ones."
     )
     names = (
         "frames",

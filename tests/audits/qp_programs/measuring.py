@@ -153,6 +153,6 @@ def qp_report(rows: Sequence[Row], totals: Sequence[Row], facts: Mapping[str, st
         f"{len(first)} programs of {len({row['set'] for row in first})} problem sets; sizes in the median: {sizes}. "
         "Every solver alone, without a hot start, in turning order; its workspace lives as long as a case. Times "
         "include the correction of the active set. *Own answer off by* is how far the solver's answer was from the "
-        f"exact one before its active set was corrected: OSQP is stopped early. Largest residuals of all final answers: {most}."
+        f"exact one before its active set was corrected: OSQP is stopped early. Largest residuals of answers: {most}."
     )
     return tables_of(about, {"": totals}, facts)
