@@ -270,6 +270,16 @@ def _coarse_triangles(field: Field, low: Any, high: Any, cell: float, cuts: Sequ
     return triangles(field, low, high, 2.0 * cell, cuts)
 
 
+@pytest.fixture(autouse=True, scope="session")
+def charts_as_they_are_laid_out_at_first() -> Iterator[None]:
+    """Draw charts without making room for all words, which takes half of the time."""
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
+        yield
+
+
 @pytest.fixture(autouse=True, scope="module")
 def emptied_caches(request: pytest.FixtureRequest) -> Iterator[None]:
     """Forget what a module's own cached functions made: hundreds of scenes make each fork of a process slower."""
