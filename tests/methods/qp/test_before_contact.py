@@ -37,7 +37,7 @@ def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
 def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine on which half of the processor time that a solve may take passes at once finds what another finds.
 
-    Toes come to rest at the edge of a pedal, where the distance has a kink: the last tenth of a millimetre was not gone.
+    Toes come to rest at the edge of a pedal, where the distance has a kink: the last 0.1 mm was not gone.
     """
     problem = problem_set("drivers").make(15, 0).problem
     quick = wb.solve(problem, wb.methods.QP(measures=False))
