@@ -123,8 +123,9 @@ def test_pose_draws_and_the_result_can_be_shown_again(task: Path, capsys: pytest
     shutil.copytree("moved", "drawn")
     assert main(["show", "drawn/result.json", "--save", "again.html"]) == 0
     assert Path("again.html").read_bytes() == Path("drawn/scene.html").read_bytes()
-    assert main(["show", "hand", "--save", "hand.html"]) == 0
-    assert "wrote hand.html" in capsys.readouterr().out
+    assert main(["show", "hand", "--save", "hand.png"]) == 0
+    assert "wrote hand.png" in capsys.readouterr().out
+    assert Path("hand.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
 def require_browser() -> None:

@@ -94,7 +94,7 @@ def behind_a_panel(measures=None, at=(0.6, -0.1, 1.25)) -> wb.Problem:
 
 def test_what_is_reached_without_measures_does_not_depend_on_them():
     """Not a posture of the search: measures neither shape its steps nor decide between its ends."""
-    method = wb.methods.QP(measures=False, restarts=2)
+    method = wb.methods.QP(measures=False, restarts=4)
     for at in ((0.6, -0.1, 1.25), (0.9, -0.1, 1.25)):  # behind the panel, and out of reach
         usual = method.solve(behind_a_panel(at=at))
         other = method.solve(behind_a_panel([wb.tasks.Hang(weight=40.0), wb.tasks.Discomfort()], at))
