@@ -40,6 +40,7 @@ from wholebody.figures.surface.nets import Triangles, triangles
 from wholebody.scene.scene import Scene
 from wholebody.view import browser, screenshot
 from wholebody.view.browser import Browser
+from wholebody.view.page import picture_page
 from wholebody.view.viewer import Viewer
 
 gc.disable()  # until all is collected: looking through what is imported takes a sixth of that time
@@ -270,6 +271,16 @@ def _coarse_triangles(field: Field, low: Any, high: Any, cell: float, cuts: Sequ
     return triangles(field, low, high, 2.0 * cell, cuts)
 
 
+@pytest.fixture(autouse=True, scope="session")
+def charts_as_they_are_laid_out_at_first() -> Iterator[None]:
+    """Draw charts without making room for all words, which takes half of the time."""
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
+        yield
+
+
 @pytest.fixture(autouse=True, scope="module")
 def emptied_caches(request: pytest.FixtureRequest) -> Iterator[None]:
     """Forget what a module's own cached functions made: hundreds of scenes make each fork of a process slower."""
@@ -348,9 +359,15 @@ class KeptBrowser(Browser):
 
 @pytest.fixture(autouse=True, scope="session")
 def kept_browsers() -> Iterator[None]:
-    """Let pictures be drawn by browsers that were started before, and small ones where no size is stated."""
+    """Let pictures be drawn by browsers that were started before, and small ones where no size is stated.
+
+    Their pages compile the shaders that a scene has, and no others beforehand, which takes half of the time of a page.
+    """
+    warm, cold = picture_page(), picture_page().replace("warm_up(JSON.parse(pane.dataset.still));", "{}")
+    assert cold != warm
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(screenshot, "Browser", KeptBrowser.start)
+        patch.setattr(screenshot, "picture_page", lambda: cold)
         for drawing in (Viewer.picture, Viewer.begin_picture):
             patch.setattr(drawing, "__defaults__", ((320, 240),))
         os.register_at_fork(after_in_child=KeptBrowser.idle.clear)  # a browser listens to one process

@@ -133,8 +133,8 @@ def test_the_pairs_of_a_large_model_are_those_of_a_small_one() -> None:
     assert again.ngeoms == count
 
 
-def test_a_scene_of_three_thousand_things_is_as_one_of_few() -> None:
-    scene = crowd(3000, spread=3.0)
+def test_a_scene_of_more_things_than_are_tabled_is_as_one_of_few() -> None:
+    scene = crowd(TABLED, spread=2.0)
     q = scene.figure.posture(scene.figure.postures[0])
     assert scene.geometry.collisionPairMapping.size == 0
     contacts = scene.contacts(q, 0.05)

@@ -175,7 +175,7 @@ def loads(arguments: argparse.Namespace) -> None:
     for row in loads.rows(clips(arguments, few), worn, longest):
         rows.append(row)
         write_rows(arguments.out / "loads.csv", facts, rows)
-        print(f"{row.clip}, {row.equipment}, {row.way}", flush=True)
+        print(f"{row.case}, {row.tool}", flush=True)
     publish("loads", loads.report(rows, facts), arguments, page=None)
 
 

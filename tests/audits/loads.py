@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from tests.audits.templates import TEMPLATES
 from wholebody.bench.measure.motion import recorded, synthetic
-from wholebody.bench.tables import render
+from wholebody.bench.rows import Row, only
+from wholebody.bench.rows import report as tables_of
 from wholebody.figures import load
 from wholebody.motion.avoidance import avoid
 from wholebody.motion.checking import ClipCheck
@@ -26,48 +26,7 @@ from wholebody.motion.worn_equipment import dressed
 WAYS = ("before", "avoided", "avoided with dynamics")
 
 
-@dataclass(frozen=True)
-class LoadRow:
-    """One clip with one piece of equipment, as it is or freed.
-
-    Attributes:
-        clip, equipment, way: what was asked; `way` is of `WAYS`.
-        frames, standing: of the clip, and in how many of them a foot stands.
-        solved: whether the report says so.
-        colliding, dips: frames in collision, and motions between free frames that dip.
-        deepest_mm: in any frame.
-        torque: largest torque of a joint, in parts of its strength.
-        beyond: by how much the worst joint needs more than its strength or than before, whichever is larger.
-        outside_mm: farthest that the zero moment point is outside of the support.
-        outside: share of the standing frames in which it is outside by more than 2 mm.
-        farther_mm: by how much it is farther outside than before, in the worst frame.
-        farther: in how many frames it is by more than 2 mm.
-        distance_mm: deviation of the joints' centres, root of the mean square.
-        sliding_mm: by how much standing feet slide more than before.
-        seconds: processor time of freeing.
-    """
-
-    clip: str
-    equipment: str
-    way: str
-    frames: int
-    standing: int
-    solved: bool
-    colliding: int
-    dips: int
-    deepest_mm: float
-    torque: float
-    beyond: float
-    outside_mm: float
-    outside: float
-    farther_mm: float
-    farther: int
-    distance_mm: float
-    sliding_mm: float
-    seconds: float
-
-
-def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: float) -> Iterator[LoadRow]:
+def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: float) -> Iterator[Row]:
     """Measure clips with each piece of equipment; those of a path are recordings.
 
     Args:
@@ -99,17 +58,46 @@ def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: fl
 def _row(
     name: str, worn: str, way: str, before: Clip, after: Clip, change: LoadChange, found: ClipCheck, solved: bool,
     seconds: float,
-) -> LoadRow:  # fmt: skip
+) -> Row:  # fmt: skip
     now, farther = change.after, change.farther
-    standing = int(now.supported.sum())
-    return LoadRow(
-        name, worn, way, len(before), standing, solved, found.colliding, found.dips, 1e3 * found.deepest,
-        now.largest_share, float(change.beyond.max()), 1e3 * float(now.outside.max()),
-        float((now.outside > PLACE).sum()) / max(standing, 1), 1e3 * float(farther.max()), int((farther > PLACE).sum()),
-        1e3 * deviation(before, after).distance, 1e3 * foot_sliding(before, after), seconds,
-    )  # fmt: skip
+    figures: dict[str, Any] = {
+        "frames": len(before),
+        "standing": int(now.supported.sum()),
+        "solved": solved,
+        "colliding": found.colliding,
+        "dips": found.dips,
+        "deepest mm": 1e3 * found.deepest,
+        "torque": now.largest_share,
+        "beyond": float(change.beyond.max()),
+        "outside mm": 1e3 * float(now.outside.max()),
+        "outside in": int((now.outside > PLACE).sum()),
+        "farther mm": 1e3 * float(farther.max()),
+        "farther in": int((farther > PLACE).sum()),
+        "deviation mm": 1e3 * deviation(before, after).distance,
+        "sliding mm": 1e3 * foot_sliding(before, after),
+        "s": seconds,
+    }
+    return Row(f"{name}, {worn}", way, figures)
 
 
-def report(measured: Sequence[LoadRow], facts: Mapping[str, str]) -> str:
+def report(measured: Sequence[Row], facts: Mapping[str, str]) -> str:
     """The table."""
-    return render("loads.md", TEMPLATES, rows=measured, facts=facts)
+    about = (
+        "Torques and balance of clips as they are, freed by `wb.avoid`, and freed by `wb.avoid(dynamics=True)`, of a "
+        "person of median strength. Torque: the largest of any joint, in parts of its strength; beyond: by how much "
+        "the worst joint needs more than its strength or than its largest torque before. Outside: how far the zero "
+        "moment point is outside of the feet that stand, and in how many frames; farther: by how much more than in the "
+        "same frame before. Colliding are frames, dips motions between free ones."
+    )
+    names = (
+        "frames",
+        "colliding",
+        "dips",
+        "torque",
+        "beyond",
+        "outside mm",
+        "farther mm",
+        "farther in",
+        "deviation mm",
+    )
+    return tables_of(about, {"": only(measured, *names)}, facts)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -24,10 +23,10 @@ from tests.audits.newton_shapes import (
     ring,
     three_bar,
 )
-from tests.audits.templates import TEMPLATES
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
-from wholebody.bench.tables import render
+from wholebody.bench.rows import Row, across, only, times
+from wholebody.bench.rows import report as tables_of
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.linear_algebra import LinearSystem, Pattern, linear_algebra
@@ -47,31 +46,8 @@ TOUCHING = 1e-4  # m: nearer than this counts as contact
 LARGEST_STAR = 300  # bodies for which a star's full normal equations are still formed
 
 
-@dataclass(frozen=True)
-class LinearRow:
-    """One factorisation on one structure.
-
-    Attributes:
-        algebra: name of the factorisation.
-        variables, equations, nonzeros: of the Jacobian.
-        fill: non-zeros of the factor.
-        analyse_us: to lay out and analyse, once a structure.
-        solve_us: to refill, factorise and solve.
-    """
-
-    shape: str
-    bodies: int
-    algebra: str
-    variables: int
-    equations: int
-    nonzeros: int
-    fill: int
-    analyse_us: float
-    solve_us: float
-
-
-def linear_rows(sizes: tuple[int, ...], repeats: int) -> Iterator[LinearRow]:
-    """Every factorisation on every shape and size."""
+def linear_rows(sizes: tuple[int, ...], repeats: int) -> Iterator[Row]:
+    """Every factorisation on every shape and size: its non-zeros, to lay out and analyse a structure, and to solve."""
     for shape, make in SHAPES.items():
         for count in sizes:
             made = make(count)
@@ -97,13 +73,13 @@ def linear_rows(sizes: tuple[int, ...], repeats: int) -> Iterator[LinearRow]:
                     solved = median_us(partial(solver.solve, task), few)
                 except WholebodyError:
                     solved = float("nan")
-                size = (pattern.width, pattern.height, len(pattern.rows))
-                yield LinearRow(shape, count, name, *size, solver.fill, analysed, solved)
+                figures = {"bodies": count, "non-zeros": len(pattern.rows), "of the factor": solver.fill}
+                yield Row(shape, name, {**figures, "ms a new structure": 1e-3 * analysed, "µs": solved})
 
 
-def exponent(rows: Sequence[LinearRow], shape: str, algebra: str) -> float:
+def exponent(rows: Sequence[Row], shape: str, algebra: str) -> float:
     """Slope of log time over log bodies, from `SMALLEST_FITTED` bodies."""
-    kept = [(row.bodies, row.solve_us) for row in rows if (row.shape, row.algebra) == (shape, algebra)]
+    kept = [(row["bodies"], row["µs"]) for row in rows if (row.case, row.tool) == (shape, algebra)]
     kept = [(n, t) for n, t in kept if n >= SMALLEST_FITTED and np.isfinite(t)]
     if len(kept) < 2:
         return float("nan")
@@ -111,35 +87,14 @@ def exponent(rows: Sequence[LinearRow], shape: str, algebra: str) -> float:
     return float(np.polyfit(n, t, 1)[0])
 
 
-@dataclass(frozen=True)
-class SolveRow:
-    """A whole solve: evaluations, factorisations and judgement of steps.
-
-    Attributes:
-        variables, nonzeros: of the Jacobian.
-        iterations, systems: Newton iterations, and linear systems solved.
-        us_each: time for a system and a variable.
-        errors: the last ones, with the most exact last.
-    """
-
-    case: str
-    variables: int
-    nonzeros: int
-    iterations: float
-    systems: float
-    ms: float
-    us_each: float
-    errors: str
-
-
-def assembly_row(case: str, made: Assembly, repeats: int) -> SolveRow:
+def assembly_row(case: str, made: Assembly, repeats: int) -> Row:
     """A reach from where an assembly stands."""
     system = made.system()
     active_system = ActiveSystem(system.batches, system.weight, "auto")
     return _reach_row(case, active_system, active_system.begin(made.variables(), ()), repeats)
 
 
-def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -> SolveRow:
+def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -> Row:
     def once() -> FeasibilityResult:
         return satisfy(active_system, x, tolerance=1e-5, iterations=50)
 
@@ -147,51 +102,34 @@ def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -
     return _solve_row(case, active_system.system.pattern, (found.iterations, found.systems), us, found.residuals)
 
 
-def _solve_row(
-    case: str, pattern: Pattern, counts: tuple[float, float], us: float, errors: Sequence[float]
-) -> SolveRow:
-    """A row; `counts` are iterations and systems."""
-    each, last = us / max(counts[1], 1) / pattern.width, " ".join(f"{value:.1e}" for value in errors[-4:])
-    return SolveRow(case, pattern.width, len(pattern.rows), *counts, 1e-3 * us, each, last)
+def _solve_row(case: str, pattern: Pattern, counts: tuple[float, float], us: float, errors: Sequence[float]) -> Row:
+    """A whole solve: evaluations, factorisations and judgement of steps; `counts` are iterations and systems."""
+    size = {"variables": pattern.width, "non-zeros": len(pattern.rows)}
+    done = dict(zip(("iterations", "systems"), counts, strict=True))
+    last = " ".join(f"{value:.1e}" for value in errors[-4:])
+    return Row(case, "", {**size, **done, "ms": 1e-3 * us, "last errors": last})
 
 
-@dataclass(frozen=True)
-class AgreementRow:
-    """One problem by two methods.
-
-    Attributes:
-        newton_ms, qp_ms: time of a solve.
-        apart: greatest difference of a joint [rad].
-        measures_apart: relative difference of the measures.
-    """
-
-    case: str
-    newton_ms: float
-    qp_ms: float
-    apart: float
-    measures_apart: float
-
-
-def paper_row(repeats: int) -> SolveRow:
+def paper_row(repeats: int) -> Row:
     """The paper's size: a chain of 30 bodies whose end is dragged so far that it takes three systems."""
     return assembly_row("the paper's size", pulled_chain(PAPER_BODIES), repeats)
 
 
-def drag_of_assembly_row(moves: int) -> SolveRow:
+def drag_of_assembly_row(moves: int) -> Row:
     """The same chain dragged in a circle through the public interface: a new place of the goal, and a solve."""
     made, last, tip = chain(PAPER_BODIES), f"b{PAPER_BODIES - 1}", np.array((LINK, 0.0, 0.0))
-    here, times, found = made.placement(last).act(tip), [], []
+    here, spent, found = made.placement(last).act(tip), [], []
     for angle in CIRCLE * np.arange(moves):
         target = here + (0.03 * np.cos(angle) - 0.05, 0.03 * np.sin(angle), -0.03)
         began = time.process_time()
         found.append(made.drop_goals().point_goal(last, target, place=tip).solve())
-        times.append(time.process_time() - began)
+        spent.append(time.process_time() - began)
     counts = float(np.mean([one.iterations for one in found])), float(np.mean([one.systems for one in found]))
-    us, errors = 1e6 * float(np.median(times)), found[-1].residuals
+    us, errors = 1e6 * float(np.median(spent)), found[-1].residuals
     return _solve_row("the same, a move of a drag", made.system().pattern, counts, us, errors)
 
 
-def loop_rows(repeats: int) -> list[SolveRow]:
+def loop_rows(repeats: int) -> list[Row]:
     """Closed loops beside open chains with as many bodies, each moved by a goal."""
     closed, opened = four_bar(), three_bar()
     for made in (closed, opened):
@@ -204,22 +142,23 @@ def loop_rows(repeats: int) -> list[SolveRow]:
     return rows + [figure_row(name, problem, repeats) for name, problem in _hands_problems()]
 
 
-def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:
+def figure_row(case: str, problem: wb.Problem, repeats: int) -> Row:
     """A reach of a figure, without polishing of the measures."""
     active_system = FigureSystem(problem, problem.workspace(), "auto")
     return _reach_row(case, active_system, active_system.variables(problem.start), max(3, repeats // 10))
 
 
-def agreement_rows(repeats: int) -> list[AgreementRow]:
+def agreement_rows(repeats: int) -> list[Row]:
     """Problems whose least effort is unique, by both methods, the loop being an equality in either."""
     rows = []
     for case, problem in _hands_problems():
         ours, theirs = wb.methods.Newton(tolerance=FINE), wb.methods.QP(tolerance=FINE)
         ends = [method.solve(problem) for method in (ours, theirs)]
-        times = [1e-3 * median_us(partial(method.solve, problem), max(3, repeats // 30)) for method in (ours, theirs)]
+        each = [1e-3 * median_us(partial(method.solve, problem), max(3, repeats // 30)) for method in (ours, theirs)]
         apart = float(np.abs(pin.difference(problem.scene.model, ends[0].q, ends[1].q)).max())
         least = [end.assessment.measure for end in ends]
-        rows.append(AgreementRow(case, times[0], times[1], apart, abs(least[0] - least[1]) / least[1]))
+        figures = {"newton ms": each[0], "qp ms": each[1], "joints apart rad": apart}
+        rows.append(Row(case, "", {**figures, "measures apart": abs(least[0] - least[1]) / least[1]}))
     return rows
 
 
@@ -234,31 +173,7 @@ def _hands_problems() -> Iterator[tuple[str, wb.Problem]]:
         yield name, wb.Problem(scene, q, goals=goals, constraints=held)
 
 
-@dataclass(frozen=True)
-class DragRow:
-    """A drag.
-
-    Attributes:
-        ms, ms_95: time of a frame that half and 95 % of the frames stay below.
-        iterations: Newton iterations a frame, mean.
-        touching: share of the frames after which the hand touches the table.
-        structures: patterns laid out: contacts that come or go in combinations not met before.
-        drift: greatest error of a constraint after any frame [m or rad].
-        deepest: deepest overlap with the table after any frame [m].
-    """
-
-    case: str
-    frames: int
-    ms: float
-    ms_95: float
-    iterations: float
-    touching: float
-    structures: int
-    drift: float
-    deepest: float
-
-
-def drag_row(frames: int, contacts: bool) -> DragRow:
+def drag_row(frames: int, contacts: bool) -> Row:
     """A drag of the right hand in an upright circle; with contacts, its lower part lies under a table's top."""
     scene = wb.Scene(wb.load("human"))
     if contacts:
@@ -272,13 +187,13 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
     low = TABLE_TOP - 0.02 if contacts else 0.8
     owners = scene.piece_owner
     table = np.array(["table" in (owners[a], owners[b]) for a, b in scene.pair_table.pairs], dtype=bool)
-    times, iterations, drift, least, workspace = [], [], 0.0, [], scene.workspace()
+    spent, iterations, drift, least, workspace = [], [], 0.0, [], scene.workspace()
     for k in range(frames):
         angle = 0.05 * k
         place = (0.45, -0.25 + 0.1 * np.sin(angle), low + 0.1 * (1.0 + np.cos(angle)))
         began = time.process_time()
         frame = drag.to(place)
-        times.append(1e3 * (time.process_time() - began))
+        spent.append(1e3 * (time.process_time() - began))
         iterations.append(frame.iterations)
         near = workspace.near(frame.q, 0.01)
         state = workspace.state
@@ -288,35 +203,36 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
         least.append(float(near.distance[table[near.number]].min(initial=np.inf)))
     distance = np.array(least)
     assert isinstance(drag.tracker, NewtonTracker)
-    return DragRow(
-        case="with a table under the lower part of the circle" if contacts else "free",
-        frames=frames,
-        ms=float(np.median(times)),
-        ms_95=float(np.percentile(times, 95)),
-        iterations=float(np.mean(iterations)),
-        touching=float((distance < TOUCHING).mean()),
-        structures=drag.tracker.frame(frame.q).structures,
-        drift=drift,
-        deepest=max(0.0, -float(distance.min(initial=np.inf))),
+    return Row(
+        "with a table under the lower part of the circle" if contacts else "free",
+        "",
+        {
+            "frames": frames,
+            **times(spent),
+            "iterations a frame": float(np.mean(iterations)),
+            "frames in contact %": 100.0 * float((distance < TOUCHING).mean()),
+            "structures": drag.tracker.frame(frame.q).structures,
+            "greatest constraint error": drift,
+            "deepest mm": 1e3 * max(0.0, -float(distance.min(initial=np.inf))),
+        },
     )
 
 
 def report(
-    linear: Sequence[LinearRow],
-    solves: Sequence[SolveRow],
-    agreements: Sequence[AgreementRow],
-    drags: Sequence[DragRow],
+    linear: Sequence[Row],
+    solves: Sequence[Row],
+    agreements: Sequence[Row],
+    drags: Sequence[Row],
     facts: Mapping[str, str],
 ) -> str:
-    """Tables to read."""
-    by_place = {(row.shape, row.bodies, row.algebra): row for row in linear}
-    sizes = [
-        (place, [by_place.get((*place, name)) for name in ALGEBRAS])
-        for place in dict.fromkeys((row.shape, row.bodies) for row in linear)
-    ]
-    exponents = [(shape, [exponent(linear, shape, name) for name in ALGEBRAS]) for shape in SHAPES]
-    return render(
-        "newton.md",
-        TEMPLATES, solves=solves, agreements=agreements, drags=drags, facts=facts, algebras=ALGEBRAS, sizes=sizes,
-        exponents=exponents,
-    )  # fmt: skip
+    """Tables to read; of the factorisations at the largest size, and how they grow."""
+    slopes = [Row(shape, name, {"exponent": exponent(linear, shape, name)}) for shape in SHAPES for name in ALGEBRAS]
+    most = max(row["bodies"] for row in linear)
+    tables = {
+        "Solves": only(solves, "variables", "non-zeros", "iterations", "ms", "last errors"),
+        "The same problem by newton and by qp": agreements,
+        "Drags of the human's hand": drags,
+        "Factorisations": [row for row in linear if row["bodies"] == most],
+        "Exponents of the time by the bodies": across(slopes, "exponent", columns="tool"),
+    }
+    return tables_of("Times are the processor's, medians.", tables, facts)

@@ -3,7 +3,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from wholebody.bench import plot_style
 from wholebody.bench.measure.track import Track, track
@@ -11,9 +10,8 @@ from wholebody.bench.measure.track import Track, track
 
 @pytest.fixture(scope="session", autouse=True)
 def coarse_pictures() -> Iterator[None]:
-    """Draw charts of fewer pixels and as they are laid out at first: to make room for all words takes half the time."""
+    """Draw charts of fewer pixels."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
         patch.setitem(plot_style.STYLE["settings"], "savefig.dpi", 40)
         yield
 

@@ -31,7 +31,7 @@ def test_a_circle_by_newton_prints_a_table_and_writes_all_files(
 ) -> None:
     out = tmp_path / "out"
     path = ["--path", "circle", "--size", "0.05"]
-    code = main(["drag", str(task), *path, "--method", "newton", "--frames", "16", "--out", str(out)])
+    code = main(["drag", str(task), *path, "--method", "newton", "--frames", "8", "--out", str(out)])
     printed = capsys.readouterr().out
     assert code == 0
     assert "reach" in printed
@@ -41,7 +41,7 @@ def test_a_circle_by_newton_prints_a_table_and_writes_all_files(
     }
     rows = csv_rows(out / "reach-newton.csv")
     assert "# processor: " in (out / "reach-newton.csv").read_text()
-    assert [int(row["frame"]) for row in rows] == list(range(16))
+    assert [int(row["frame"]) for row in rows] == list(range(8))
     assert max(float(row["deepest mm"]) for row in rows) < 0.1
     assert max(float(row["between mm"]) for row in rows) < 1.0
     assert "| reach | newton" in (out / "reach-newton.md").read_text()

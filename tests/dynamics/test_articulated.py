@@ -70,20 +70,6 @@ def test_a_blow_between_a_ball_and_a_hand_in_the_air_keeps_their_momentum() -> N
     assert np.linalg.norm(moving.momentum()[:3]) > 0.2
 
 
-def test_a_ragdoll_falls_and_rests_and_its_energy_never_grows() -> None:
-    scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
-    start = scene.figure.posture("standing").copy()
-    start[2], start[3:7] = 0.4, (0.0, np.sin(-0.75), 0.0, np.cos(0.75))  # on its back, in the air
-    world = wb.World(scene, start, spring=wb.Actuated(scene.figure, stiffness=0.0, damping=1.0))
-    energies = [world.energy]
-    for _ in range(90):  # the feet, on their heels, fall last
-        assert world.step().deepest < 1e-3
-        energies.append(world.energy)
-    assert np.diff(energies).max() < 1e-6
-    assert energies[0] - energies[-1] > 100.0  # J
-    assert np.abs(world.velocity).max() < 0.05
-
-
 def test_a_hand_is_pushed_aside_by_a_swinging_beam_and_comes_back() -> None:
     hand = wb.load("hand")
     start = hand.posture("relaxed")
@@ -307,7 +293,7 @@ def test_limp_hands_that_collide_keep_their_angular_momentum() -> None:
     down = pin.XYZQUATToSE3(start[at : at + 7]).rotation.T @ (0.0, 0.0, -1.0)
     moving.velocity[first : first + 6] = np.concatenate([down, (-1.0, 0.7, 0.2)])
     began, energy, met = moving.momentum(), moving.energy(), 0
-    for _ in range(20):
+    for _ in range(14):
         moving.advance(start, DT, {}, {})
         met += moving.points
     assert moving.momentum() == pytest.approx(began, abs=1e-12)  # it changed by 3e-4 of 0.014 N m s
@@ -324,7 +310,7 @@ def test_a_box_comes_to_rest_on_a_hand() -> None:
     scene.add(wb.Box((0.05, 0.05, 0.03)), name="box", at=place, body=wb.Body(mass=0.5, material="human"))
     stiff = wb.Actuated(hand, stiffness={"root": 3000.0, **dict.fromkeys(hand.joints, 5.0)})
     world, fastest = wb.World(scene, start, spring=stiff), 0.0
-    for number in range(70):
+    for number in range(60):
         frame = world.step(start)
         fastest = max(fastest, np.abs(world.engine.twist("box")).max() if number > 50 else 0.0)  # type: ignore[union-attr]
     assert frame.impulses["box"] == pytest.approx((0.0, 0.0, 0.5 * 9.81 * DT), abs=1e-3)

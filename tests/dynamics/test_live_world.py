@@ -60,7 +60,7 @@ def test_a_body_follows_the_mouse_and_flies_on_when_it_is_let_go(live: LiveWorld
 def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounded_speed(live: LiveWorld) -> None:
     began = live.place("left_palm")
     places = [began]
-    for _ in range(40):
+    for _ in range(30):
         live.follow({"left_palm": began + [0.0, 0.15, 0.3]})
         live.move()
         places.append(live.place("left_palm"))
@@ -69,7 +69,7 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
     for _ in range(12):  # 0.2 s without a word
         live.move()
     assert live.place("left_palm") == pytest.approx(places[-1], abs=0.01)
-    for _ in range(80):
+    for _ in range(60):
         live.move()
     assert live.place("left_palm") == pytest.approx(began, abs=0.02)
     with pytest.raises(wb.UnknownNameError, match="left_palm"):

@@ -66,10 +66,10 @@ def test_reba_tables_are_those_of_the_printed_worksheet() -> None:
 
 
 def test_scores_of_random_postures_are_those_of_the_worksheets(person: wb.Figure) -> None:
-    """200 postures and works, whose scores the worksheets, followed step by step, give too."""
+    """120 postures and works, whose scores the worksheets, followed step by step, give too."""
     rng = np.random.default_rng(38)
     limits, seen, grips = person.limits, {"rula": set[int](), "reba": set[int]()}, get_args(Coupling)
-    for _ in range(200):
+    for _ in range(120):
         q = person.posture("standing")
         # by shares of the ranges, as most people stand and work within a small part of these
         joint = q[limits.idx_q] + rng.uniform(0.0, 1.0) * (rng.uniform(limits.lower, limits.upper) - q[limits.idx_q])

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import os
-import subprocess
+import runpy
 import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -318,7 +317,7 @@ def test_a_four_bar_among_obstacles_stops_where_geometry_says(example: Example, 
 
 def test_a_scissor_lift_stops_at_its_load_limit_and_at_a_beam(example: Example, tmp_path: Path) -> None:
     module = example("scissor_lift")
-    module.FRAMES = 4  # of a drag; the example has more to look at
+    module.FRAMES = 2  # of a drag; the example has more to look at
     for load, (low, high) in module.main(out=tmp_path, pictures=False).items():
         angle = np.arcsin(low / (module.STAGES * module.BAR))
         assert module.STAGES * load * module.GRAVITY / np.tan(angle) == pytest.approx(module.STRONGEST, rel=1e-3)
@@ -417,30 +416,25 @@ def test_every_example_is_tested_and_listed(root: Path) -> None:
     assert all(f"]({name}.py)" in table for name in scripts)
 
 
-def test_runs_as_a_script_from_anywhere(root: Path, tmp_path: Path) -> None:
+def test_runs_as_a_script_from_anywhere(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     script = root / "examples" / "robot_arm_among_obstacles.py"
-    done = subprocess.run(
-        [sys.executable, str(script), "--no-pictures"], cwd=tmp_path, capture_output=True, text=True, timeout=200
-    )
-    assert done.returncode == 0, done.stderr
-    assert "solved" in done.stdout
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(script.parent)  # as python does
+    monkeypatch.setattr(sys, "argv", [str(script), "--no-pictures"])
+    runpy.run_path(str(script), run_name="__main__")
+    assert "solved" in capsys.readouterr().out
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.browser
 def test_ends_in_a_picture_and_a_page(example: Example, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from PIL import Image
-
-    module = example("robot_arm_among_obstacles")
-    module.main(out=tmp_path / "made", pictures=True)
-    page = unpacked(tmp_path / "made" / "robot_arm_among_obstacles.html")
-    assert "post" in page
-    picture = tmp_path / "made" / "robot_arm_among_obstacles.png"
-    if not picture.exists() and os.environ.get("WHOLEBODY_REQUIRE_BROWSER") != "1":
-        pytest.skip("no Chromium here")
-    pixels = np.asarray(Image.open(picture).convert("RGB"), dtype=float)
-    assert pixels.shape == (240, 320, 3)
-    assert pixels.std() > 10.0
+    """What a picture shows tests of `view` see."""
+    drawn: list[Path] = []
+    monkeypatch.setattr(wb.Viewer, "picture", lambda viewer, path: drawn.append(path))
+    example("robot_arm_among_obstacles").main(out=tmp_path / "made", pictures=True)
+    assert "post" in unpacked(tmp_path / "made" / "robot_arm_among_obstacles.html")
+    assert drawn == [tmp_path / "made" / "robot_arm_among_obstacles.png"]
 
 
 def test_a_clip_with_a_pack_is_free_in_every_frame(
@@ -496,7 +490,7 @@ def test_a_planned_motion_is_free_between_its_ends(example: Example, tmp_path: P
 
 def test_a_lift_keeps_feet_on_the_floor_and_hands_at_the_crate(example: Example, tmp_path: Path) -> None:
     module = example("lift_retargeted")
-    module.FRAMES, module.RATE = 30, 15.0  # the example has more to look at
+    module.FRAMES, module.RATE = 20, 10.0  # the example has more to look at
     clip = module.main(out=tmp_path, pictures=False)
     moves = {name: [pin.XYZQUATToSE3(at) for at in track] for name, track in clip.things.items()}
     assert assess_motion(module.build(clip.things["crate"]), clip.q, clip.dt, moves).depth.max() <= 1e-4
@@ -518,7 +512,8 @@ def test_branches_of_an_arm_differ_and_reach_one_place(example: Example, tmp_pat
 
 def test_every_domino_falls(example: Example, tmp_path: Path) -> None:
     module = example("dominoes")
-    module.COUNT = 3  # the example has more to look at
+    module.COUNT, build = 3, module.build  # the example has more to look at
+    module.build = lambda: (lambda world, way: (world, way[:70]))(*build())
     assert module.main(out=tmp_path, pictures=False) == 3
 
 
@@ -526,6 +521,8 @@ def test_the_ball_rests_in_the_arms_that_caught_it(
     example: Example, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module, frames, step = example("catch_a_ball"), list[Any](), wb.World.step
+    build = module.build
+    module.build = lambda: (lambda world, way: (world, way[:90]))(*build())
     monkeypatch.setattr(wb.World, "step", lambda world, q: (frames.append(step(world, q)), frames[-1])[1])
     assert module.main(out=tmp_path, pictures=False) < 1e-3  # m/s
     flown = [np.array(frame.placements["ball"].translation) for frame in frames]

@@ -42,20 +42,19 @@ def test_whole_solves_are_shortened_to_the_limit(method: str) -> None:
 def test_the_root_keeps_its_limits_where_it_gives_way_to_a_thing() -> None:
     limits = wb.tasks.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
     turned = 0
-    for seed in range(3):
-        throw = Throw(np.random.default_rng(seed), SHAPES["board"], 2.5, 3.0)
-        start = throw.scene.figure.posture("standing")
-        tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
-        goals = [wb.Point("right_index_tip", tip)]
-        asked = wb.Problem(throw.scene, start, goals=goals, constraints=[limits], clearance=0.001)
-        tracker, q = wb.methods.QP().tracker(asked, DT), asked.start
-        for _ in range(throw.frames):
-            throw.next()
-            step = tracker.step(q)
-            assert excess(asked, q, step.q) <= ROUNDING
-            assert step.displacement == pytest.approx(pin.difference(throw.scene.model, q, step.q))
-            turned += len(step.path) > 2 and np.abs(step.displacement[3:6]).max() > 0.01
-            q = step.q
+    throw = Throw(np.random.default_rng(2), SHAPES["board"], 2.5, 3.0)  # other throws exceed nothing
+    start = throw.scene.figure.posture("standing")
+    tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
+    goals = [wb.Point("right_index_tip", tip)]
+    asked = wb.Problem(throw.scene, start, goals=goals, constraints=[limits], clearance=0.001)
+    tracker, q = wb.methods.QP().tracker(asked, DT), asked.start
+    for _ in range(throw.frames):
+        throw.next()
+        step = tracker.step(q)
+        assert excess(asked, q, step.q) <= ROUNDING
+        assert step.displacement == pytest.approx(pin.difference(throw.scene.model, q, step.q))
+        turned += len(step.path) > 2 and np.abs(step.displacement[3:6]).max() > 0.01
+        q = step.q
     assert turned > 3
 
 

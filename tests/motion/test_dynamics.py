@@ -106,13 +106,13 @@ def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(shared_data: Path) -> wb.Clip:
     """The first frames of a man who crouches for a jump."""
-    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 30)
-    return wb.retarget(motion, wb.load("human"))[:18]
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 26)
+    return wb.retarget(motion, wb.load("human"))[:16]
 
 
 def _with_a_ball(recorded: wb.Clip) -> wb.Scene:
     """A ball where the right hand passes."""
-    palm = recorded.figure.placement(recorded.q[12], "right_palm").translation
+    palm = recorded.figure.placement(recorded.q[10], "right_palm").translation
     return wb.Scene(recorded.figure).add(wb.Sphere(0.03), name="ball", at=tuple(palm + (0.02, 0.0, 0.0)))
 
 

@@ -155,7 +155,7 @@ def test_feet_slide_no_more_and_bodies_jerk_no_more_at_higher_rates(
     human: wb.Figure, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(f"{__name__}.DT", 1 / 120)
-    motion, stands = walker.__wrapped__(flat, 1.0)
+    motion, stands = walker.__wrapped__(flat, 0.8)
     clip = wb.retarget(motion, human)
     slid = slides(clip, stands)
     assert slid.mean() < 1e-4
@@ -191,7 +191,7 @@ def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
 
 
 def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) -> None:
-    motion, _ = walker(flat, 0.5)
+    motion, _ = walker(flat, 0.3)
     at = np.array(motion.positions)
     for joint, inside in ((13, (0.0, 0.12, 1.0)), (14, (0.05, 0.02, 0.85))):
         at[:, joint] = at[:, 0] * [1.0, 0.0, 0.0] + inside
@@ -245,7 +245,7 @@ def test_programs_of_many_pieces_without_room_stay_small(program_rows: list[int]
     """Its 39 spheres are all inside the floor or the ceiling: a program of their hundreds of rows took a second."""
     person = wb.load("human", detail="spheres")
     low = wb.Scene(person).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 1.0))
-    wb.retarget(walker(flat, 0.1)[0], person, low)
+    wb.retarget(walker(flat, 0.07)[0], person, low)
     assert max(program_rows) <= person.model.nv + len(person.cones)
 
 
@@ -321,7 +321,7 @@ def test_a_jump_that_collides_and_ends_that_overlap_are_told_before(human: wb.Fi
 
 
 def test_stance_of_a_clip_on_uneven_ground(human: wb.Figure) -> None:
-    motion, stands = walker(rocks, 1.5)
+    motion, stands = walker(rocks, 1.2)
     clip = wb.retarget(motion, human)
     found = standing(human, clip.q, clip.dt)
     for side, mask in stands.items():

@@ -66,8 +66,9 @@ def test_both_hands_stay_on_a_box_that_one_carries(human: Figure, rests: list[st
     found = wb.avoid(clip, scene)
     assert found.report.solved, found.report.message
     assert apart(clip, found.clip, "right_palm", "left_palm") < 1e-3
-    loose = wb.avoid(clip, scene, constraints=[LET_GO])
-    assert apart(clip, loose.clip, "right_palm", "left_palm") > 5e-3
+    if not rests:
+        loose = wb.avoid(clip, scene, constraints=[LET_GO])
+        assert apart(clip, loose.clip, "right_palm", "left_palm") > 5e-3
 
 
 def test_a_hand_stays_on_a_rail_while_the_arm_gives_way(human: Figure) -> None:

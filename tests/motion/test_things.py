@@ -247,18 +247,16 @@ def test_round_things_rise_by_the_scale_of_what_is_below_them() -> None:
 def test_hands_stay_on_a_table_that_stands() -> None:
     motion, track = lifting(2)
     motion = SkeletonMotion(
-        motion.names, motion.parents, motion.offsets, np.repeat(motion.rotations[:1], 20, axis=0),
-        np.repeat(motion.positions[:1], 20, axis=0), 1 / 30,
+        motion.names, motion.parents, motion.offsets, np.repeat(motion.rotations[:1], 8, axis=0),
+        np.repeat(motion.positions[:1], 8, axis=0), 1 / 30,
     )  # fmt: skip
     figure = wb.load("human", stature=1.65)
     scene = among(figure, track[0])
     held = wb.retarget(motion, figure, scene)
-    off = gaps(wb.Clip(figure, held.q, held.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right")
+    off = gaps(wb.Clip(figure, held.q, held.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (8, 1))}), "right")
     assert np.abs(off[:, 0]).max() < 2e-3
     loose = wb.retarget(motion, figure, scene, ground=None)  # holds nothing, and is free all the same
-    off = gaps(
-        wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (20, 1))}), "right"
-    )
+    off = gaps(wb.Clip(figure, loose.q, loose.dt, things={"box": np.tile(pin.SE3ToXYZQUAT(track[0]), (8, 1))}), "right")
     assert off[:, 0].min() > 5e-3
 
 

@@ -182,17 +182,6 @@ def test_a_figure_that_is_held_is_not(told: Any) -> None:
     assert not told()
 
 
-def test_millimetres_are_thought_of(told: Any, tmp_path: Path) -> None:
-    wb.Scene(wb.load("hand")).add(wb.Sphere(0.1), name="ball", at=(800, 0, 0))
-    assert "divide millimetres by 1000" in told()[0]
-    with pytest.raises(wb.InputError, match=r"1\.75 if it is in millimetres"):
-        wb.load("human", stature=1750)
-    file = tmp_path / "t.toml"
-    file.write_text('[figure]\nname = "human"\n[[goal]]\ntype = "point"\nframe = "gaze"\ntarget = [800, 0, 1]\n')
-    with pytest.raises(wb.FileFormatError, match=r"0\.8 if it is in millimetres"):
-        wb.read_task(file)
-
-
 def test_what_is_mounted_with_something_on_it_is_to_be_mounted_one_after_the_other(tmp_path: Path) -> None:
     def rim() -> wb.Figure:
         return wb.figures.adjustable({"rim": wb.Torus(0.1, 0.01)}, tilt=(-0.1, 0.1))

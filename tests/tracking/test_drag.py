@@ -131,7 +131,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
         problem = _problem(scene)
         tracker = wb.methods.QP().tracker(problem, 1.0 / 60.0)
         q, programs = problem.start, 0
-        for frame in range(70):
+        for frame in range(60):
             problem.retarget([wb.Point("right_index_tip", _circle(0.2 * max(frame - 40, 0)))])
             q, count, *_ = tracker.frame(q, tolerance)
             programs += count if frame > 40 else 0

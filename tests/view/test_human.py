@@ -93,7 +93,7 @@ def test_a_page_for_pictures_has_the_shaders_of_a_person_and_light_from_behind_a
         there = set(browser.evaluate(programs))
         viewer = Viewer(scene, screenshots=Screenshots())
         viewer.show(figure.posture("standing"), problem=problem)
-        found.append(np.asarray(Image.open(viewer.picture(tmp_path / "person.png", (320, 240)))))
+        found.append(np.asarray(Image.open(viewer.picture(tmp_path / "person.png", (160, 120)))))
         assert set(browser.evaluate(programs)) <= there
         assert browser.evaluate(f"MeshCat.THREE.ShaderChunk.lights_fragment_begin.includes('direction ) {side} ?')")
     assert np.array_equal(*found)

@@ -63,7 +63,7 @@ def test_a_picture_has_the_panel_in_a_corner_beside_the_figure(chromium: str, tm
     scene = wb.Scene(wb.load("hand"))
     q = scene.figure.neutral
     middle = scene.state(q).center_of_mass()
-    width, height = 640, 480
+    width, height = 480, 360
     with wb.Viewer(scene, title="A hand") as viewer:
         viewer.show(q)
         for aside, column in (((0.0, 0.0, 0.0), 0), ((0.0, 0.3, -0.2), 1)):  # in the middle; at the left, at the top

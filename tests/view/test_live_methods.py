@@ -105,13 +105,13 @@ def test_a_thing_is_taken_where_the_mouse_sees_it(tmp_path: Path) -> None:
         drag("start", 0.1)
         assert live.taken == "ball"
         drag("update", 0.6)
-        for _ in range(90):
+        for _ in range(60):
             page.go_on(live)
         assert live.place("ball") == pytest.approx((0.7, -0.6, 0.6), abs=0.02)
         assert ball.position == pytest.approx(live.place("ball"), abs=1e-5)
         drag("end", 0.6)
         assert not live.taken
-        for _ in range(90):
+        for _ in range(60):
             page.go_on(live)
         assert live.place("ball")[2] == pytest.approx(0.1, abs=1e-3)
         foot = page._pieces[live.scene.piece_owner.index("left_foot")]

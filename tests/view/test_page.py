@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -88,15 +89,7 @@ def test_the_live_page_follows_and_a_late_one_catches_up(
         as_pinocchio_says(exhibit, exhibit.posture(40))
         assert [entry["text"] for entry in nodes(["/names/table", "/names/egg"])] == ["table", "egg"]
         assert nodes(["/names/floor"]) == [None]
-
-
-def test_things_that_come_and_go(exhibit: Any, browser: Browser, as_pinocchio_says: Any, nodes: Any) -> None:
-    import coal
-
-    with Viewer(exhibit) as viewer:
-        viewer.show(exhibit.posture(1))
-        browser.open(viewer.url)
-        exhibit.add("crate", coal.Box(0.3, 0.3, 0.3), (1.0, 1.0, 0.0))
+        exhibit.add("crate", coal.Box(0.3, 0.3, 0.3), (1.0, 1.0, 0.0))  # things come and go
         viewer.show(exhibit.posture(2))
         assert viewer.sync(10.0)
         as_pinocchio_says(exhibit, exhibit.posture(2))
@@ -224,7 +217,9 @@ def test_a_marker_that_comes_later_and_never_changes_is_where_it_belongs(
     np.testing.assert_allclose(normal["matrix"][:3, 2] / LOOK.normal_length, contacts.normal[0], atol=1e-5)
 
 
-def test_goals_are_at_their_targets_with_what_is_left(exhibit: Any, browser: Browser, nodes: Any) -> None:
+def test_goals_are_at_their_targets_with_what_is_left_and_ghosts_are_transparent(
+    exhibit: Any, browser: Browser, nodes: Any
+) -> None:
     q = exhibit.posture(1)
     data = exhibit.model.createData()
     pin.framesForwardKinematics(exhibit.model, data, q)
@@ -259,8 +254,21 @@ def test_goals_are_at_their_targets_with_what_is_left(exhibit: Any, browser: Bro
         np.testing.assert_allclose(np.cross(wanted, (2.0, 1.0, 0.0) - head.translation), 0.0, atol=1e-5)
         np.testing.assert_allclose(nodes(["/goals/4/target"])[0]["matrix"][:3, 3], [0.1, 0.0, 0.0], atol=1e-5)
         viewer.show(q)
+        viewer.ghosts([exhibit.posture(4), ghost := exhibit.posture(5)])
         assert viewer.sync(10.0)
         assert not nodes(["/goals/0/target"])[0]["seen"]
+        pin.forwardKinematics(exhibit.model, data, ghost)
+        hat = exhibit.geometry.geometryObjects[exhibit.geometry.getGeometryId("hat:0")]
+        path = "/ghosts/1/objects/hat/head2_joint/hat:0"
+        (found,) = nodes([path])
+        np.testing.assert_allclose(found["matrix"], (data.oMi[hat.parentJoint] * hat.placement).homogeneous, atol=1e-5)
+        assert found["opacity"] == pytest.approx(LOOK.ghost[3])
+        names = [*path.strip("/").split("/"), "<object>"]
+        assert browser.evaluate(f"viewer.scene_tree.find({names}).object.castShadow") is False
+        assert nodes(["/ghosts/1/objects/table"]) == [None]
+        viewer.ghosts([])
+        assert viewer.sync(10.0)
+        assert nodes(["/ghosts"]) == [None]
 
 
 def test_colours_at_projected_places(exhibit: Any, browser: Browser, tmp_path: Path) -> None:
@@ -308,27 +316,6 @@ def test_the_camera_holds_the_figure_and_its_ghosts_in_the_middle(
     assert np.abs(seen[:, :2]).max() < 1.0  # all of it is in the picture,
     assert np.abs(seen[:, :2]).max() > 0.7  # fills it,
     assert np.abs(seen[:, 0].min() + seen[:, 0].max()) < 0.4  # in its middle
-
-
-def test_ghosts_are_transparent_throw_no_shadow_and_are_replaced(exhibit: Any, browser: Browser, nodes: Any) -> None:
-    ghost = exhibit.posture(5)
-    with Viewer(exhibit) as viewer:
-        viewer.show(exhibit.posture(1))
-        viewer.ghosts([exhibit.posture(4), ghost])
-        browser.open(viewer.url)
-        data = exhibit.model.createData()
-        pin.forwardKinematics(exhibit.model, data, ghost)
-        hat = exhibit.geometry.geometryObjects[exhibit.geometry.getGeometryId("hat:0")]
-        path = "/ghosts/1/objects/hat/head2_joint/hat:0"
-        (found,) = nodes([path])
-        np.testing.assert_allclose(found["matrix"], (data.oMi[hat.parentJoint] * hat.placement).homogeneous, atol=1e-5)
-        assert found["opacity"] == pytest.approx(LOOK.ghost[3])
-        names = [*path.strip("/").split("/"), "<object>"]
-        assert browser.evaluate(f"viewer.scene_tree.find({names}).object.castShadow") is False
-        assert nodes(["/ghosts/1/objects/table"]) == [None]
-        viewer.ghosts([])
-        assert viewer.sync(10.0)
-        assert nodes(["/ghosts"]) == [None]
 
 
 def test_axes_of_frames_are_drawn_where_they_are_and_go_when_asked(browser: Browser, nodes: Any) -> None:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from tests.audits.qp_programs.recording import Recorded
-from tests.audits.templates import TEMPLATES
-from wholebody.bench.statistics import Interval, quantile, share
-from wholebody.bench.tables import render
+from wholebody.bench.rows import Row
+from wholebody.bench.rows import report as tables_of
+from wholebody.bench.statistics import quantile, share
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
@@ -35,94 +34,28 @@ class Residuals(NamedTuple):
     gap: float
 
 
-@dataclass(frozen=True)
-class QPRow:
-    """One program by one solver.
-
-    Attributes:
-        set, name: of the program.
-        solver: which was asked.
-        variables, soft, elastic: sizes of the program.
-        wall_us, cpu_us: wall and processor's time of a solve, the correcting of the active set included [us].
-        by: what closed the program.
-        exact: whether the answer is exact.
-        iterations: of the solver.
-        own_error: how far the solver's own answer is from the exact one [rad, m]; nan where it has none.
-        primal, dual, gap: see `Residuals`; of the final answer.
-    """
-
-    set: str
-    name: str
-    solver: str
-    variables: int
-    soft: int
-    elastic: int
-    wall_us: float
-    cpu_us: float
-    by: str
-    exact: bool
-    iterations: int
-    own_error: float
-    primal: float
-    dual: float
-    gap: float
-
-
-def of(compute: Callable[[Sequence[QPRow]], Any]) -> dict[str, Any]:
-    """What computes a field of `QPSummary` from its rows, as metadata."""
-    return {"of": compute}
-
-
-@dataclass(frozen=True)
-class QPSummary:
-    """All programs by one solver; times in microseconds.
-
-    Attributes:
-        closed: programs that the solver closed itself, its active set corrected.
-        share: of them, with Wilson's interval.
-        handed_on: programs that semismooth Newton steps closed, or another solver.
-        failed: programs without an exact answer.
-        median_us, p95_us: with intervals by the bootstrap.
-    """
-
-    solver: str
-    programs: int = field(metadata=of(lambda rows: len(rows)))
-    closed: int = field(metadata=of(lambda rows: sum(map(_by_itself, rows))))
-    share: Interval = field(metadata=of(lambda rows: share([_by_itself(row) for row in rows])))
-    handed_on: int = field(metadata=of(lambda rows: sum(row.exact and not _by_itself(row) for row in rows)))
-    failed: int = field(metadata=of(lambda rows: sum(not row.exact for row in rows)))
-    median_us: Interval = field(metadata=of(lambda rows: quantile([row.wall_us for row in rows], 0.5)))
-    p95_us: Interval = field(metadata=of(lambda rows: quantile([row.wall_us for row in rows], 0.95)))
-    cpu_median_us: float = field(metadata=of(lambda rows: np.median([row.cpu_us for row in rows])))
-    cpu_p95_us: float = field(metadata=of(lambda rows: np.quantile([row.cpu_us for row in rows], 0.95)))
-    iterations: float = field(metadata=of(lambda rows: np.median([row.iterations for row in rows])))
-    own_error: float = field(metadata=of(lambda rows: _own(rows, 0.5)))
-    own_worst: float = field(metadata=of(lambda rows: _own(rows, 1.0)))
-    primal: float = field(metadata=of(lambda rows: max(row.primal for row in rows)))
-    dual: float = field(metadata=of(lambda rows: max(row.dual for row in rows)))
-    gap: float = field(metadata=of(lambda rows: max(row.gap for row in rows)))
-
-
-def _by_itself(row: QPRow) -> bool:
+def _by_itself(row: Row) -> bool:
     """Whether the solver that was asked closed a program."""
-    return row.by == (ACTIVE_SET if row.solver == ActiveSetSolver.name else row.solver)
+    return bool(row["by"] == (ACTIVE_SET if row.tool == ActiveSetSolver.name else row.tool))
 
 
-def _own(rows: Sequence[QPRow], part: float) -> float:
+def _own(rows: Sequence[Row], part: float) -> float:
     """A quantile of how far the solver's own answers are off, of those that it has."""
-    known = [row.own_error for row in rows if np.isfinite(row.own_error)]
+    known = [row["own error"] for row in rows if np.isfinite(row["own error"])]
     return float(np.quantile(known, part)) if known else float("nan")
 
 
 def measure(
     programs: Sequence[Recorded], solvers: Sequence[str], say: Callable[[str], None] = lambda text: None
-) -> list[QPRow]:
-    """Give every program to every solver.
+) -> list[Row]:
+    """Give every program to every solver: its sizes, microseconds by the clock and of the processor, what closed it.
+
+    The own error is how far the solver's own answer is from the exact one [rad, m]; nan where it has none.
 
     A case's programs are solved in the order in which they were posed, by a solver that is made for the case and keeps
     its workspace, as in a solve. It is set up, and that is not counted, by the last program of the case.
     """
-    rows: list[QPRow] = []
+    rows: list[Row] = []
     done = ""
     for turn, mine in enumerate(_cases(programs)):
         shift = turn % len(solvers)
@@ -142,7 +75,7 @@ def _cases(programs: Sequence[Recorded]) -> Iterator[list[Recorded]]:
         yield list(mine)
 
 
-def _row(one: Recorded, name: str, solver: QPSolver) -> QPRow:
+def _row(one: Recorded, name: str, solver: QPSolver) -> Row:
     program = one.program
     gc.disable()
     worked, clock = time.thread_time_ns(), time.perf_counter_ns()
@@ -151,11 +84,12 @@ def _row(one: Recorded, name: str, solver: QPSolver) -> QPRow:
     gc.enable()
     own = solver.uncorrected
     found = residuals(program, answer)
-    return QPRow(
-        one.set, one.name, name, program.size, len(program.target), len(program.least), wall / 1e3, cpu / 1e3,
-        answer.by, answer.exact, answer.iterations,
-        float("nan") if own is None else float(np.abs(own - answer.x).max(initial=0.0)), *found,
-    )  # fmt: skip
+    error = float("nan") if own is None else float(np.abs(own - answer.x).max(initial=0.0))
+    sizes = {"set": one.set, "variables": program.size, "soft": len(program.target), "elastic": len(program.least)}
+    times = {"wall µs": wall / 1e3, "cpu µs": cpu / 1e3, "by": answer.by, "exact": answer.exact}
+    return Row(
+        one.name, name, {**sizes, **times, "iterations": answer.iterations, "own error": error, **found._asdict()}
+    )
 
 
 def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
@@ -188,20 +122,37 @@ def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
     )
 
 
-def summaries(rows: Sequence[QPRow], solvers: Sequence[str]) -> list[QPSummary]:
-    """One row a solver."""
+def summaries(rows: Sequence[Row], solvers: Sequence[str]) -> list[Row]:
+    """One row a solver, with intervals: of the share by Wilson, of quantiles by the bootstrap."""
     found = []
     for name in solvers:
-        mine = [row for row in rows if row.solver == name]
-        figures = {each.name: each.metadata["of"](mine) for each in fields(QPSummary) if each.metadata}
-        found.append(QPSummary(name, **figures))
+        mine = [row for row in rows if row.tool == name]
+        closed = [_by_itself(row) for row in mine]
+        figures = {
+            "exact by itself": share(closed),
+            "handed on": sum(row["exact"] and not own for row, own in zip(mine, closed, strict=True)),
+            "not exact": sum(not row["exact"] for row in mine),
+            "median µs": quantile([row["wall µs"] for row in mine], 0.5),
+            "p95 µs": quantile([row["wall µs"] for row in mine], 0.95),
+            "iterations": float(np.median([row["iterations"] for row in mine])),
+            "own answer off by, median": _own(mine, 0.5),
+            "worst": _own(mine, 1.0),
+        }
+        found.append(Row(name, "", figures))
     return found
 
 
-def qp_report(rows: Sequence[QPRow], totals: Sequence[QPSummary], facts: Mapping[str, str]) -> str:
+def qp_report(rows: Sequence[Row], totals: Sequence[Row], facts: Mapping[str, str]) -> str:
     """All programs by every solver."""
-    first = [row for row in rows if row.solver == totals[0].solver]
-    medians = {
-        name: float(np.median([getattr(row, name) for row in first])) for name in ("variables", "soft", "elastic")
-    }
-    return render("qp.md", TEMPLATES, totals=totals, programs=first, medians=medians, facts=facts)
+    first = [row for row in rows if row.tool == totals[0].case]
+    sizes = ", ".join(
+        f"{np.median([row[name] for row in first]):.0f} {name}" for name in ("variables", "soft", "elastic")
+    )
+    most = ", ".join(f"{name} {max(row[name] for row in rows):.0e}" for name in Residuals._fields)
+    about = (
+        f"{len(first)} programs of {len({row['set'] for row in first})} problem sets; sizes in the median: {sizes}. "
+        "Every solver alone, without a hot start, in turning order; its workspace lives as long as a case. Times "
+        "include the correction of the active set. *Own answer off by* is how far the solver's answer was from the "
+        f"exact one before its active set was corrected: OSQP is stopped early. Largest residuals of answers: {most}."
+    )
+    return tables_of(about, {"": totals}, facts)

@@ -18,7 +18,6 @@ from wholebody.figures.surface.making import halfway
 FINE_SURFACES = True
 
 THIGHS: dict[str, tuple[dict[str, Any], float, float]] = {
-    "man": ({"sex": "male"}, 0.845, 0.622),
     "woman": ({"sex": "female"}, 0.781, 0.611),
     "tall light man": ({"sex": "male", "stature": 1.87, "mass": 66.0}, 0.925, 0.524),
 }
@@ -75,7 +74,7 @@ def test_a_half_bone_slides_by_the_cosine() -> None:
 @pytest.mark.parametrize(("flexion", "abduction"), [(165.0, 15.0), (0.0, 155.0)])
 def test_no_flesh_of_a_raised_arm_hangs_below_the_shoulder(flexion: float, abduction: float) -> None:
     """Under the joint there is the arm's radius, cloth, and some of the fold of the armpit."""
-    figure = load("human", sex="male")
+    figure = load("human", **THIGHS["tall light man"][0])
     data = figure.model.createData()
     raised = {"shoulder_flexion": flexion, "shoulder_abduction": abduction, "clavicle_elevation": 25.0}
     joints = {f"left_{name}": radians(angle) for name, angle in raised.items()}

@@ -348,7 +348,7 @@ def test_a_residual_is_that_of_the_numbers_now() -> None:
 
 
 @pytest.mark.parametrize("joint", ["revolute", "spherical"])
-@pytest.mark.parametrize("share", [0.9, 0.3, 0.0, -0.7])
+@pytest.mark.parametrize("share", [0.3, -0.7])
 def test_a_straight_chain_folds_to_a_goal_on_its_own_line(joint: str, share: float) -> None:
     """No motion lowers the error to first order there, and the chain can fold."""
     made = _straight(5, joint)

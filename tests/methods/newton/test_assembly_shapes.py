@@ -14,7 +14,6 @@ import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_joints import OnSurface
-from wholebody.methods.newton.linear_algebra import Gram
 
 H = 1e-6
 
@@ -104,26 +103,18 @@ def test_pairs_enter_near_and_leave_farther() -> None:
     assert [active(0.1 + gap) for gap in (0.20, 0.045, 0.02, 0.045, 0.07)] == [False, False, True, True, False]
 
 
-def test_a_goal_that_moves_is_not_analysed_anew_in_contact(monkeypatch: pytest.MonkeyPatch) -> None:
-    analyses: list[int] = []
-    whole = Gram.__init__
-
-    def init(self: Any, *arguments: Any) -> None:
-        analyses.append(1)
-        whole(self, *arguments)
-
-    monkeypatch.setattr(Gram, "__init__", init)
+def test_a_goal_that_moves_is_not_analysed_anew_in_contact() -> None:
     made = wb.Assembly().body("ball", (0, 0, 0.11), shape=wb.Sphere(0.1)).add(wb.HalfSpace(), name="floor")
     drag = wb.tracking.Drag(made.point_goal("ball", (0, 0, 0.11)))
     drag.to((0, 0, 0.11))
-    first, structures = len(analyses), made.structures
+    structures = made.structures
     for k in range(20):
         frame = drag.to((0.02 * k, 0.0, 0.05))  # slides on the floor, below which the goal is
         assert frame.q[2] == pytest.approx(0.1, abs=1e-4)
-    assert (len(analyses), made.structures) == (first, structures)
+    assert made.structures == structures
     made.move("floor", at=(0, 0, -0.01))
     drag.to((0.4, 0.0, 0.05))
-    assert (len(analyses), made.structures) == (first, structures)
+    assert made.structures == structures
     assert drag.q[2] == pytest.approx(0.09, abs=1e-3)
 
 

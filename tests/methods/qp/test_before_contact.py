@@ -19,17 +19,9 @@ def test_feet_get_onto_a_board_that_they_begin_under() -> None:
     assert scene.figure.placement(solution.q, "left_sole").translation[2] == pytest.approx(0.30, abs=1e-3)
 
 
-@pytest.mark.parametrize("number", [15])
-def test_toes_come_to_rest_at_the_edge_of_a_pedal(number: int) -> None:
-    """At an edge the distance has a kink, at which the last tenth of a millimetre was not gone."""
-    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.methods.QP(measures=False, time_limit=30.0))
-    assert solution.solved, solution
-
-
-@pytest.mark.parametrize("number", [8])
-def test_contacts_are_met_from_an_end_in_front_of_all_faces(number: int) -> None:
+def test_contacts_are_met_from_an_end_in_front_of_all_faces() -> None:
     """The first descents end 0.2 m away, or in front of the faces, whence feasibility alone stalls at 1 cm."""
-    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.methods.QP(measures=False, time_limit=30.0))
+    solution = wb.solve(problem_set("drivers").make(8, 0).problem, wb.methods.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
 
 
@@ -43,7 +35,10 @@ def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
 
 
 def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine on which half of the processor time that a solve may take passes at once finds what another finds."""
+    """A machine on which half of the processor time that a solve may take passes at once finds what another finds.
+
+    Toes come to rest at the edge of a pedal, where the distance has a kink: the last 0.1 mm was not gone.
+    """
     problem = problem_set("drivers").make(15, 0).problem
     quick = wb.solve(problem, wb.methods.QP(measures=False))
     clock = iter([0.0])

@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.contact_rows import SAME_NORMAL, ContactRowBuilder
 from wholebody.methods.qp.settings import TRACKING
 
 PUSHES = {
@@ -54,8 +53,3 @@ def rows_alone(monkeypatch):
 @pytest.mark.parametrize("push", PUSHES.values(), ids=PUSHES.keys())
 def test_a_box_pushed_onto_a_table_does_not_rock_into_it(free_bodies, push):
     assert least_distance_while_pushed(free_bodies, push) >= 0.9 * CLEARANCE
-
-
-def test_with_one_row_a_pair_it_would(free_bodies, monkeypatch):
-    monkeypatch.setattr(ContactRowBuilder.__init__, "__defaults__", (0, SAME_NORMAL))  # ends of a patch
-    assert min(least_distance_while_pushed(free_bodies, push) for push in PUSHES.values()) < 0.9 * CLEARANCE

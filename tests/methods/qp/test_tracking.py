@@ -149,7 +149,7 @@ def program() -> QuadraticProgram:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("field", ["linear", "rows", "weight", "elastic", "elastic_weight", "lower", "upper"])
+@pytest.mark.parametrize("field", ["rows", "elastic_weight"])
 def test_compiled_loops_are_not_given_sizes_that_do_not_fit(field: str) -> None:
     whole = program()
     assert solve_from(whole, violated_set(whole), 50) is not None

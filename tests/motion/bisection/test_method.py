@@ -113,12 +113,6 @@ def test_every_frame_is_free_and_frames_outside_of_the_groups_stay(swing: Clip, 
     assert np.array_equal(result.q[:, :7], swing.q[:, :7])  # the root stays
 
 
-def test_a_free_clip_stays_as_it_is(swing: Clip) -> None:
-    result = freed_by(Bisection(), swing, dressed(swing.figure, "vest_plate"))
-    assert np.array_equal(result.q, swing.q)
-    assert (result.posture_solves, result.programs) == (0, 0)
-
-
 def test_the_original_clip_and_the_answer_do_not_depend_on_earlier_runs(swing: Clip) -> None:
     clip = swing[8:30]
     scene, kept = dressed(swing.figure, "side_sphere"), swing.q.copy()
@@ -170,7 +164,7 @@ def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figu
 def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(human: Figure) -> None:
     """Self-collision of the thesis: 39 spheres, and a pouch filled with spheres."""
     swing, figure = swinging(human), wb.load("human", detail="spheres")
-    clip, scene = Clip(figure, swing.q, swing.dt), wb.Scene(figure)
+    clip, scene = Clip(figure, swing.q[:21], swing.dt), wb.Scene(figure)
     for piece in equipment("pouches", figure):
         piece.filled(8, envelope=True).attach(scene)
     assert (depths(scene, clip.q) > DEEP).any()

@@ -10,6 +10,7 @@ import pytest
 
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.suite.compare import report
 from wholebody.bench.suite.compare.lock import read_lock
 from wholebody.bench.suite.problem_sets.registry import beside
 from wholebody.cli.bench import group
@@ -22,7 +23,9 @@ def bench(*words: str) -> int:
     return int(arguments.run(arguments))
 
 
-def test_two_methods_on_one_problem(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_methods_on_one_problem(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = ("--quick", "--cases", "1", "--sets", "robot_arm", "--methods", "qp/daqp", "dls", "--out", str(tmp_path))
     assert bench(*words) == 0
     assert "report.html" in capsys.readouterr().out
@@ -31,6 +34,8 @@ def test_two_methods_on_one_problem(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "Robot arm" in (tmp_path / "report.html").read_text()
     with pytest.raises(InputError, match=r"holds a run with seeds = \[0, 1, 2\], and \[3, 4, 5\] is asked for"):
         bench(*words, "--seed", "3")
+    drawn = {chart.stem: (chart, chart) for chart in (tmp_path / "charts").glob("*.svg")}
+    monkeypatch.setattr(report, "draw_all", lambda *_: drawn)  # to draw is most of the time
     assert bench("--again", str(tmp_path / "lock.json"), "--out", str(tmp_path / "again")) == 0
     assert re.search(r"\d+ figures compared; ", capsys.readouterr().out)
     first, again = (read_lock(folder / "lock.json") for folder in (tmp_path, tmp_path / "again"))

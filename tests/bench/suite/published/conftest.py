@@ -3,18 +3,13 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.bench.suite.published.published_helpers import SEED
-from wholebody.bench.suite.problem_sets.case import Posed
+from tests.bench.suite.published.published_helpers import SEED, short_drag
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.published.export import export
-
-EVERY = 10  # of how many frames of a drag one is there: each of them is judged
 
 
 @pytest.fixture(scope="session")
@@ -30,14 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _export(found: Path) -> None:
-    whole = SETS["drag"]
-
-    def short(number: int, rng: np.random.Generator) -> Posed:
-        problem, witness, *ways = whole.pose(number, rng)
-        frames, path = ways
-        return problem, witness, frames[::EVERY], path[::EVERY]
-
-    export([*({**SETS, "drag": replace(whole, pose=short)}).values()], 2, SEED, found)
+    export([*({**SETS, "drag": short_drag()}).values()], 2, SEED, found)
 
 
 @pytest.fixture(scope="session")

@@ -3,10 +3,29 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from wholebody.bench.suite.problem_sets.case import Posed, ProblemSet
+from wholebody.bench.suite.problem_sets.registry import SETS
+
 SEED = 3
+EVERY = 10  # of how many frames of a drag one is there: each of them is judged
+
+
+def short_drag() -> ProblemSet:
+    """Return the set of drags with some of its frames."""
+    whole = SETS["drag"]
+
+    def short(number: int, rng: np.random.Generator) -> Posed:
+        problem, witness, *ways = whole.pose(number, rng)
+        frames, path = ways
+        return problem, witness, frames[::EVERY], path[::EVERY]
+
+    return replace(whole, pose=short)
 
 
 def witness(folder: Path, name: str) -> dict[str, Any]:
