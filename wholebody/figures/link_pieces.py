@@ -21,11 +21,10 @@ from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.fields import Range
 from wholebody.figures.figure import Figure
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
-from wholebody.geometry.hull import hull_piece
+from wholebody.geometry.hull import around, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh, read_parts
 from wholebody.geometry.pieces import LARGEST, SMALLEST
-from wholebody.geometry.polygonal import around
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""

@@ -18,12 +18,11 @@ from wholebody.base.checks import array, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.convex import CONCAVITY, VERTICES, check_mesh, convex_pieces
-from wholebody.geometry.hull import check_points, hull_piece
+from wholebody.geometry.hull import SIDES, check_points, cylinder_pieces, hull_piece, torus_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.placement import unit_vector
-from wholebody.geometry.polygonal import SIDES, cylinder_pieces, torus_pieces
 
 LENGTH = Range(SMALLEST, LARGEST, "m")
 Length: TypeAlias = Annotated[float, LENGTH]

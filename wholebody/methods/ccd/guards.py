@@ -1,7 +1,7 @@
 """Guards: joints that have left a reach cone or a range of motion are brought back, or else stay at their last values.
 
 Cones and ranges that share joints, those of a shoulder or of a leg, are kept together. The cones are those of
-`wholebody.figures.reach_cones`; what leaves a range is brought back by the least change of its joints.
+`wholebody.figures.motion_ranges`; what leaves a range is brought back by the least change of its joints.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, TwistRange
-from wholebody.figures.reach_cones import ReachCone
+from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, ReachCone, TwistRange
 from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, floats, rotated, seen_from, three
 from wholebody.methods.ccd.sweep import Aims
 

@@ -28,25 +28,23 @@ class _Trust:
     """How far the next step is trusted, from what became of the last ones.
 
     Attributes:
-        damping: of the goals; its square applies to constraints.
+        damping: of the goals.
         share: of the constraints' errors that a step corrects.
         clamp: largest reduction of a goal's error in a step, metres or radians.
         funnel: violation of constraints up to which a step may reduce the goals' errors, metres or radians.
     """
 
     def __init__(self, least_damping: float, funnel: float) -> None:
-        self.damping, self.funnel = least_damping, funnel
+        self.damping, self.funnel, self._least = least_damping, funnel, least_damping
         self.share, self.clamp = 1.0, STEPS.error_clamp
-        self._least = least_damping
-
-    def raise_damping(self) -> None:
-        """After a step that failed, or is too long."""
-        self.damping = max(STEPS.first_damping, self.damping * STEPS.damping_up)
 
     def fail(self) -> None:
         """After a step that was not taken."""
-        self.raise_damping()
+        self._raise_damping()
         self.share, self.clamp = max(0.5 * self.share, 0.05), max(0.5 * self.clamp, 1e-3)
+
+    def _raise_damping(self) -> None:
+        self.damping = max(STEPS.first_damping, self.damping * STEPS.damping_up)
 
     def succeed(self, ratio: float) -> None:
         """After a step with this ratio of the actual to the predicted reduction of the goals' errors."""
@@ -54,7 +52,7 @@ class _Trust:
             lower = STEPS.damping_down * self.damping if self.damping > STEPS.first_damping else 0.0
             self.damping = max(lower, self._least)
         elif ratio < 0.25:
-            self.raise_damping()
+            self._raise_damping()
         self.share, self.clamp = min(1.0, 2.0 * self.share), min(STEPS.error_clamp, 2.0 * self.clamp)
 
     def narrow(self, least: float) -> None:
@@ -139,7 +137,11 @@ class Iteration:
             before = self._norms(self.residual)
             far = self.goal > self.goal_tolerance and before[0] > trust.funnel
             restore = not goals or far
-            step = self._trusted_step(trust, before[0], restore, goals, measures)
+            goal_share = 0.0 if restore else min(1.0, trust.clamp / max(self.goal, 1e-300))
+            try:
+                step = self.step(trust.damping, trust.share, goal_share, goals, measures)
+            except SingularSystemError:
+                step = np.zeros_like(self.x)
             length = self.length(step)
             trial = active.retract(self.x + length * step)
             if active.runs_into():  # the new contact is an inequality now: repeat the step from its start
@@ -166,23 +168,6 @@ class Iteration:
             if stagnant >= patience:
                 self.stationary = not early_exit
                 return
-
-    def _trusted_step(
-        self, trust: _Trust, violation: float, restore: bool, goals: bool, measures: Measures
-    ) -> Array:  # fmt: skip
-        """The step (7 n,), damped until it is not far longer than what it corrects; zero where that fails."""
-        share = 0.0 if restore else min(1.0, trust.clamp / max(self.goal, 1e-300))
-        most = np.inf
-        if self.goal > STEPS.far and not restore:
-            most = STEPS.amplified * (violation + min(trust.clamp, self.goal))
-        try:
-            step = self.step(trust.damping, trust.share, share, goals, measures)
-            while self._motion(step) > most and trust.damping < 1.0 and not self.active_system.control.over:
-                trust.raise_damping()
-                step = self.step(trust.damping, trust.share, share, goals, measures)
-        except SingularSystemError:
-            return np.zeros_like(self.x)
-        return step
 
     def _ratio(self, before: float, after: float, promised: float, restore: bool) -> float:
         """Actual over predicted reduction of the goals' errors; 1 where that says nothing of the damping."""
@@ -228,12 +213,12 @@ class Iteration:
     ) -> Array:
         """The step of one iteration; the active set changes until the linear solution agrees with it.
 
-        `damping` of the goals, squared for constraints; `share` and `goal_share` of the errors of constraints and
-        goals that it corrects; `proximity`: factor of the least motion, against the measures.
+        `damping` of the goals; `share` and `goal_share` of the errors of constraints and goals that it corrects;
+        `proximity`: factor of the least motion, against the measures.
         """
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
-        diagonal = np.full(len(asked), STEPS.hard_damping + STEPS.hard_share * damping * damping)
+        diagonal = np.full(len(asked), STEPS.hard_damping)
         softness = (STEPS.goal_damping if goal_share else STEPS.restoring_damping) + damping if goals else FREE
         diagonal[self.goal_rows] = softness / self.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
@@ -291,8 +276,7 @@ class Iteration:
         if hard + goal <= 0.1 * self.tolerance:
             return True
         gain = before[1] - promised[1]
-        # after a full step towards the goals curved equations are violated by its square
-        if hard <= max(funnel, before[1] * before[1]) and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
+        if hard <= funnel and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
             return True
         restored = before[0] - hard >= STEPS.restored * max(before[0] - promised[0], 0.0) and hard < before[0]
         return restored and (before[0] > self.tolerance or goal <= before[1])

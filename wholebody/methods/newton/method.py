@@ -15,9 +15,8 @@ from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import TOLERANCE, SolvingTracker, UnsupportedTermError, check_problem
-from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
-from wholebody.methods.descents import Descends
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
