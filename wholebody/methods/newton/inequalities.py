@@ -63,7 +63,7 @@ class SquaredSlacks:
             at = np.maximum(self._at[crossing], 0.0)
             way[crossing] = at / np.maximum(at - predicted[crossing], 1e-300)
             first = float(way.min())
-            self.slack[way <= first] = 0.0
+            self.slack[way <= first + 0.01] = 0.0  # those that become zero soon after the first become active with it
             self._at = self._at + first * (predicted - self._at)
             return first, True
         self._at = predicted

@@ -28,23 +28,25 @@ class _Trust:
     """How far the next step is trusted, from what became of the last ones.
 
     Attributes:
-        damping: of the goals.
+        damping: of the goals; its square applies to constraints.
         share: of the constraints' errors that a step corrects.
         clamp: largest reduction of a goal's error in a step, metres or radians.
         funnel: violation of constraints up to which a step may reduce the goals' errors, metres or radians.
     """
 
     def __init__(self, least_damping: float, funnel: float) -> None:
-        self.damping, self.funnel, self._least = least_damping, funnel, least_damping
+        self.damping, self.funnel = least_damping, funnel
         self.share, self.clamp = 1.0, STEPS.error_clamp
+        self._least = least_damping
+
+    def raise_damping(self) -> None:
+        """After a step that failed, or is too long."""
+        self.damping = max(STEPS.first_damping, self.damping * STEPS.damping_up)
 
     def fail(self) -> None:
         """After a step that was not taken."""
-        self._raise_damping()
+        self.raise_damping()
         self.share, self.clamp = max(0.5 * self.share, 0.05), max(0.5 * self.clamp, 1e-3)
-
-    def _raise_damping(self) -> None:
-        self.damping = max(STEPS.first_damping, self.damping * STEPS.damping_up)
 
     def succeed(self, ratio: float) -> None:
         """After a step with this ratio of the actual to the predicted reduction of the goals' errors."""
@@ -52,7 +54,7 @@ class _Trust:
             lower = STEPS.damping_down * self.damping if self.damping > STEPS.first_damping else 0.0
             self.damping = max(lower, self._least)
         elif ratio < 0.25:
-            self._raise_damping()
+            self.raise_damping()
         self.share, self.clamp = min(1.0, 2.0 * self.share), min(STEPS.error_clamp, 2.0 * self.clamp)
 
     def narrow(self, least: float) -> None:
@@ -137,11 +139,7 @@ class Iteration:
             before = self._norms(self.residual)
             far = self.goal > self.goal_tolerance and before[0] > trust.funnel
             restore = not goals or far
-            goal_share = 0.0 if restore else min(1.0, trust.clamp / max(self.goal, 1e-300))
-            try:
-                step = self.step(trust.damping, trust.share, goal_share, goals, measures)
-            except SingularSystemError:
-                step = np.zeros_like(self.x)
+            step = self._trusted_step(trust, before[0], restore, goals, measures)
             length = self.length(step)
             trial = active.retract(self.x + length * step)
             if active.runs_into():  # the new contact is an inequality now: repeat the step from its start
@@ -168,6 +166,23 @@ class Iteration:
             if stagnant >= patience:
                 self.stationary = not early_exit
                 return
+
+    def _trusted_step(
+        self, trust: _Trust, violation: float, restore: bool, goals: bool, measures: Measures
+    ) -> Array:  # fmt: skip
+        """The step (7 n,), damped until it is not far longer than what it corrects; zero where that fails."""
+        share = 0.0 if restore else min(1.0, trust.clamp / max(self.goal, 1e-300))
+        most = np.inf
+        if self.goal > STEPS.far and not restore:
+            most = STEPS.amplified * (violation + min(trust.clamp, self.goal))
+        try:
+            step = self.step(trust.damping, trust.share, share, goals, measures)
+            while self._motion(step) > most and trust.damping < 1.0 and not self.active_system.control.over:
+                trust.raise_damping()
+                step = self.step(trust.damping, trust.share, share, goals, measures)
+        except SingularSystemError:
+            return np.zeros_like(self.x)
+        return step
 
     def _ratio(self, before: float, after: float, promised: float, restore: bool) -> float:
         """Actual over predicted reduction of the goals' errors; 1 where that says nothing of the damping."""
@@ -213,12 +228,12 @@ class Iteration:
     ) -> Array:
         """The step of one iteration; the active set changes until the linear solution agrees with it.
 
-        `damping` of the goals; `share` and `goal_share` of the errors of constraints and goals that it corrects;
-        `proximity`: factor of the least motion, against the measures.
+        `damping` of the goals, squared for constraints; `share` and `goal_share` of the errors of constraints and
+        goals that it corrects; `proximity`: factor of the least motion, against the measures.
         """
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
-        diagonal = np.full(len(asked), STEPS.hard_damping)
+        diagonal = np.full(len(asked), STEPS.hard_damping + STEPS.hard_share * damping * damping)
         softness = (STEPS.goal_damping if goal_share else STEPS.restoring_damping) + damping if goals else FREE
         diagonal[self.goal_rows] = softness / self.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0

@@ -146,7 +146,7 @@ class NewtonTracker(SolvingTracker):
             if self._bounded and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
                 state = self.workspace.state.update(q)
                 ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
-                active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
+                active_system.bodies.step = q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0)
             found, spent = None, 0
             if len({goal.weight for goal in self.problem.goals}) > 1:
                 found = self._satisfied(active_system, q, enough, even=True)
@@ -213,5 +213,5 @@ class NewtonTracker(SolvingTracker):
             self._lay_out()
         self._active_system.retarget()
         self._active_system.objective.follow()
-        self._active_system.bodies.free_step()
+        self._active_system.bodies.step = None
         return self._active_system

@@ -14,11 +14,16 @@ class Steps(NamedTuple):
     most_damping: float = 1e4  # beyond it a failed step ends the iteration
     damping_up: float = 8.0  # factors after a failed step, and after a good one
     damping_down: float = 0.1
+    hard_share: float = 1e-6  # of the squared damping applies to constraints, for conflicts among them
     restoring_damping: float = 0.03  # of goals in a step that only restores: they keep their errors, but may give way
     # m or rad: largest reduction of a goal's error in a step. Larger: fewer steps, more of them fail
     error_clamp: float = 0.3
     # change of Euler parameters in a step, half the radians. Larger: beyond what a linearisation says
     largest_turn: float = 0.35
+    # motion per metre of target beyond which a step is damped: the equations are nearly singular there
+    amplified: float = 6.0
+    # m or rad: goal error from which that is tested; nearer, the measures may move more than the goals
+    far: float = 0.05
     # m or rad of violation allowed for a metre of goal, and at most; beyond it a step only restores. Larger: longer
     # steps; at metres, goals far out of reach pull chains open so far that they do not close again
     funnel: float = 0.5

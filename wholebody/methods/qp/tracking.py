@@ -22,7 +22,7 @@ from wholebody.methods.control import BUDGET, budget_for_sweep
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver, WorkingSet
 from wholebody.methods.qp.step_program import QPStep, StepProgram
-from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
+from wholebody.methods.qp.turning import predicted_distances, unseen_by_rows
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
 from wholebody.solution import Solution
@@ -203,7 +203,7 @@ class QPTracker(SolvingTracker):
         curved = share * motion * (share * answer.turn + TRACKING.off)  # roughly, and rather too much
         if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
-            if curved > least_unseen(answer.asked):
+            if curved > unseen_by_rows(answer.asked):
                 bent = program.turning.linearisation_error(at, program.rows, displacement)
             if bent > 0.0:
                 displacement, share, following = self._corrected(at, displacement, share, bent > TRACKING.midway)
