@@ -18,9 +18,8 @@ from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
+from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE, steady
 from wholebody.motion.files.base import Frames, Motion
-from wholebody.motion.thing_tracks import steady
 
 VERSION = 1  # of the layout of the arrays
 
