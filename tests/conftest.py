@@ -31,10 +31,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from wholebody.base.errors import WholebodyError
-from wholebody.figures import load
+from wholebody.figures import load, surface
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
-from wholebody.figures.surface import making, surface
+from wholebody.figures.surface import making
 from wholebody.figures.surface.fields import Field
 from wholebody.figures.surface.nets import Triangles, triangles
 from wholebody.scene.scene import Scene

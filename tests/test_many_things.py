@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.assessment import all_pairs
 from wholebody.assessment.all_pairs import AllPairs
-from wholebody.geometry import hull, pair_distances, polygonal
+from wholebody.geometry import hull, pair_distances
 from wholebody.geometry.large_models import TABLED, geometry_model
 from wholebody.motion.checking import check
 
@@ -155,8 +155,8 @@ def test_hulls_of_like_shapes_are_found_once(monkeypatch: pytest.MonkeyPatch) ->
     found: list[str] = []
     search = hull._solid_hull
     monkeypatch.setattr(hull, "_solid_hull", lambda cloud, what: (found.append(what), search(cloud, what))[1])
-    polygonal._unit_cylinder.cache_clear()
-    polygonal.torus_pieces.cache_clear()
+    hull._unit_cylinder.cache_clear()
+    hull.torus_pieces.cache_clear()
     rng = np.random.default_rng(0)
     solid, scene = wb.Hull(rng.normal(size=(20, 3))), wb.Scene(wb.load("avatar"))
     for number, (radius, length) in enumerate(rng.uniform(0.01, 0.5, size=(10, 2))):
@@ -166,6 +166,6 @@ def test_hulls_of_like_shapes_are_found_once(monkeypatch: pytest.MonkeyPatch) ->
         if piece.name.startswith("Cylinder"):
             own = np.array(piece.geometry.points())
             again = hull.hull_piece(own, "as it is")
-            assert len(own) == len(np.array(again.geometry.points())) == 2 * polygonal.SIDES, number
+            assert len(own) == len(np.array(again.geometry.points())) == 2 * hull.SIDES, number
     names = [what for what in found if what != "as it is"]
-    assert sorted(names) == sorted(["Cylinder", "Hull", "Hull", *["Torus"] * polygonal.SECTORS])
+    assert sorted(names) == sorted(["Cylinder", "Hull", "Hull", *["Torus"] * hull.SECTORS])

@@ -25,7 +25,7 @@ from wholebody import tracking
 from wholebody.dynamics.live_world import LiveWorld
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
-from wholebody.geometry.compound import Compound
+from wholebody.geometry.shapes import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.planning.distinct_solutions import Solutions

@@ -21,8 +21,8 @@ import pinocchio as pin
 import wholebody as wb
 from tests.measuring import measure
 from wholebody.base.arrays import Array
+from wholebody.figures.surface import surface_of
 from wholebody.figures.surface.making import halfway
-from wholebody.figures.surface.surface import surface_of
 
 RIGHT_ANGLES = {
     f"{side}_{joint}": radians(90.0)

@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.geometry.compound import Compound
+from wholebody.geometry.shapes import Compound
 from wholebody.motion.worn_equipment import READY, Equipment, bounds, equipment, group_of
 
 

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from wholebody.base.errors import InputError
 from wholebody.geometry.placement import quaternions
-from wholebody.motion.thing_tracks import steady
+from wholebody.motion.clip import steady
 from wholebody.view import drawing
 from wholebody.view.style import LOOK
 

@@ -14,11 +14,11 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.assessment.all_pairs import AllPairs, Label, NearPairs, all_pairs
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
+from wholebody.figures.model_check import joint_of
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
@@ -209,16 +209,14 @@ def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
     for bound in asked.bounds:
         low_bound, high_bound = bound.bounds(state, None)
         lower, upper = np.maximum(lower, low_bound), np.minimum(upper, high_bound)
-    identity = np.eye(nv)
+    identity, names = np.eye(nv), state.model.names
     for at_work, sign, limited in ((lower >= -ACTIVE, 1.0, limited_low), (upper <= ACTIVE, -1.0, limited_high)):
         columns = np.flatnonzero(at_work)
-        one_sided.add(sign * identity[columns], [_of_joint(state.model, int(k), bool(limited[k])) for k in columns])
+        labels: list[Label] = [
+            ("limit" if limited[k] else "bound", (names[joint_of(state.model, int(k))],)) for k in columns
+        ]
+        one_sided.add(sign * identity[columns], labels)
     return _Active(signed, one_sided, gaps, contacts)
-
-
-def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
-    joint = next(j for j in range(1, model.njoints) if model.joints[j].idx_v <= column < model.idx_vs[j] + model.nvs[j])
-    return ("limit" if limited else "bound"), (model.names[joint],)
 
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:

@@ -45,14 +45,11 @@ def brief(self: Any) -> str:
     named = fields(self) if is_dataclass(self) else ()
     names = {one.name: one.default for one in named if one.repr} or dict.fromkeys(getattr(self, "_fields", ()), self)
     values = {name: getattr(self, name) for name in names}
-    shown = [f"{name}={_word(value)}" for name, value in values.items() if not _is(value, names[name])]
+    plain = (int, float, str, type(None))
+    usual = {name for name, value in values.items() if isinstance(value, plain) and value == names[name]}
+    shown = [f"{name}={_word(value)}" for name, value in values.items() if name not in usual]
     text = f"{type(self).__name__}({', '.join(shown)})"
     return text if len(text) <= LINE else f"{text[: LINE - 4]}...)"
-
-
-def _is(value: object, default: object) -> bool:
-    """Whether a number, text or None is the default."""
-    return isinstance(value, (int, float, str, type(None))) and value == default
 
 
 def _word(value: Any) -> str:

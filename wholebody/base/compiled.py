@@ -38,10 +38,10 @@ TOGETHER = (
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
-        "wholebody.motion.trajectory.banded_kernel",
+        "wholebody.motion.trajectory.interior_point",
     ),
     (
-        "wholebody.methods.qp.escaping",
+        "wholebody.methods.qp.tracking",
         "wholebody.methods.qp.turning",
     ),
 )

@@ -23,8 +23,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel
-from wholebody.dynamics.coupling import Actuated
-from wholebody.dynamics.figure_points import Moved, Points, axes_of
+from wholebody.dynamics.coupling import Actuated, Moved, Points, axes_of
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.pieces import places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies

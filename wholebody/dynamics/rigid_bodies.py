@@ -20,9 +20,8 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
-from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.dynamics.bodies_state import BodiesState, Joints
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
-from wholebody.dynamics.joints import Joints
 from wholebody.dynamics.passing import StepStart, free_between
 from wholebody.dynamics.pieces import ContactFinder, ContactPoints, Pieces
 from wholebody.dynamics.sleeping import Sleepers

@@ -17,9 +17,8 @@ from wholebody.dynamics import (
     rows_kernel,
     solve_kernel,
 )
-from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.dynamics.bodies_state import BodiesState, Joints
 from wholebody.dynamics.impact_kernel import SLOW
-from wholebody.dynamics.joints import Joints
 from wholebody.dynamics.motion_kernel import Bodies
 from wholebody.dynamics.pieces import ContactPoints, SweptPoints
 from wholebody.dynamics.rows_kernel import JointPoints, Rows

@@ -20,8 +20,7 @@ from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import array, choice, instance, posture, time_step, whole
 from wholebody.base.errors import InputError
 from wholebody.dynamics.articulated import Articulated
-from wholebody.dynamics.coupling import Actuated, Coupling, PushedContacts, Spring
-from wholebody.dynamics.figure_points import Moved
+from wholebody.dynamics.coupling import Actuated, Coupling, Moved, PushedContacts, Spring
 from wholebody.dynamics.frame import EngineFrame, one_frame
 from wholebody.dynamics.pieces import segment_placements, surface_of
 from wholebody.dynamics.rigid_bodies import RigidBodies

@@ -6,8 +6,8 @@ from wholebody.figures.description import Chain, JointCone, Limits
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import finger_angles
 from wholebody.figures.loading import join, load
+from wholebody.figures.motion_ranges import ReachCone
 from wholebody.figures.packaged_urdf import urdf_path
-from wholebody.figures.reach_cones import ReachCone
 
 __all__ = [
     "Chain",

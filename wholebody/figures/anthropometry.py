@@ -101,7 +101,7 @@ class Person:
             ahead += x
             backs.append(part.back(of) - ahead)
         girdle = (ahead + offsets[-1][0], offsets[-1][1], share * sum(z for _, _, z in offsets))
-        frame = Skeleton(hip, self._offset("left_hip_flexion")[1], girdle, max(backs))
+        frame = Skeleton(hip, girdle, max(backs))
         arms, dimensions = arm_sizes(self.sex, of, self.stated, frame)
         return of | arms, dimensions
 

@@ -13,8 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import Solid
-from wholebody.figures.motion_ranges import MotionRange
-from wholebody.figures.reach_cones import ReachCone
+from wholebody.figures.motion_ranges import MotionRange, ReachCone
 
 ROUNDED = 1e-3  # rad, m: files round the values of postures, such as 1.5707, and the limits that they are at
 ROOT_JOINT = "root_joint"

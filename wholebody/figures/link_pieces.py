@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import logging
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
@@ -21,11 +20,10 @@ from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.fields import Range
 from wholebody.figures.figure import Figure
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
-from wholebody.geometry.hull import hull_piece
+from wholebody.geometry.hull import around, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh, read_parts
 from wholebody.geometry.pieces import LARGEST, SMALLEST
-from wholebody.geometry.polygonal import around
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
@@ -210,9 +208,10 @@ def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
         content = place.read_bytes()
     except OSError:
         return make()
-    # The 2 is another one whenever what is kept changes.
-    key = hashlib.sha256(f"visual 2 {MANY} {FINE} {scale!r} {place.suffix}".encode() + content).hexdigest()
-    return cached_entry(key, make, _packed, _unpacked)
+    # The 3 is another one whenever what is kept changes.
+    key = hashlib.sha256(f"visual 3 {MANY} {FINE} {scale!r} {place.suffix}".encode() + content).hexdigest()
+    kept: MeshParts = cached_entry(key, make)
+    return kept
 
 
 def thinned(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
@@ -222,24 +221,3 @@ def thinned(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[n
     kept = clustered(vertices, faces, np.floor(vertices / FINE).astype(np.int64))
     used, local = np.unique(kept, return_inverse=True)
     return vertices[used], local.reshape(-1, 3)
-
-
-def _packed(parts: MeshParts) -> bytes:
-    arrays: dict[str, Any] = {}
-    for number, (vertices, faces, color) in enumerate(parts):
-        arrays[f"vertices{number}"], arrays[f"faces{number}"] = vertices.astype(np.float32), faces.astype(np.uint32)
-        arrays[f"color{number}"] = np.array(() if color is None else color)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
-
-
-def _unpacked(data: bytes) -> MeshParts:
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        found = []
-        for number in range(len(arrays.files) // 3):
-            color = [float(part) for part in arrays[f"color{number}"]]
-            paint = (color[0], color[1], color[2], color[3]) if color else None
-            vertices, faces = arrays[f"vertices{number}"].astype(float), arrays[f"faces{number}"].astype(np.int64)
-            found.append((vertices, faces, paint))
-        return tuple(found)

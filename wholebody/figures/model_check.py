@@ -51,6 +51,13 @@ def with_joint_frames(model: pin.Model) -> pin.Model:
     return model
 
 
+def joint_of(model: pin.Model, freedom: int) -> int:
+    """The joint of a model that has a degree of freedom; 0 where none has."""
+    return next(
+        (joint for joint in range(1, model.njoints) if 0 <= freedom - model.idx_vs[joint] < model.nvs[joint]), 0
+    )
+
+
 def along_z(axis: Array) -> Array:
     """A rotation (3, 3) whose third column is a unit direction."""
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)

@@ -61,7 +61,6 @@ class Skeleton(NamedTuple):
     """What the sizes of the arms depend on, metres."""
 
     hip_height: float  # of the hip joint above the sole
-    hip_y: float  # hip joint beside the middle
     girdle: tuple[float, float, float]  # (3,) the clavicle's inner end, from the hip joints' middle
     back: float  # the rearmost point of the trunk behind the hip joint
 

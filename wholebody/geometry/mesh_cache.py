@@ -8,26 +8,24 @@ is discarded. If the folder is not writable, nothing is cached.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
+import math
 import os
 import time
+import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import with_values
 from wholebody.base.errors import InputError
 from wholebody.base.files import write
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece, hull_triangles
 from wholebody.version import __version__
-
-T = TypeVar("T")
 
 VARIABLE = "WHOLEBODY_CACHE"
 """Environment variable that names another folder for the cache."""
@@ -70,33 +68,44 @@ def cache_folder() -> Path:
 
 def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
     """Pieces from the cache, or made and cached, by content, settings and libraries; notes begin with `what`."""
-    digest = hashlib.sha256("\0".join(("2", __version__, settings)).encode())
+    digest = hashlib.sha256("\0".join(("3", __version__, settings)).encode())
     for part in content:
         digest.update(hashlib.sha256(part).digest())
 
-    def made() -> ConvexPieces:
-        found = make()
-        return with_values(found, notes=tuple(note.removeprefix(what) for note in found.notes))
+    def made() -> Any:
+        pieces, added, notes = make()
+        stored = [
+            (np.array(one.geometry.points()), hull_triangles(one.geometry), one.placement.translation, one.volume)
+            for one in pieces
+        ]
+        return stored, added, [note.removeprefix(what) for note in notes]
 
-    found = cached_entry(digest.hexdigest(), made, _packed, _unpacked)
-    return with_values(found, notes=tuple(what + note for note in found.notes))
+    stored, added, notes = cached_entry(digest.hexdigest(), made)
+    pieces = tuple(
+        Piece(coal_convex(points, triangles), pin.SE3(np.eye(3), centre), volume)
+        for points, triangles, centre, volume in stored
+    )
+    return ConvexPieces(pieces, added, tuple(what + note for note in notes))
 
 
-def cached_entry(key: str, make: Callable[[], T], packed: Callable[[T], bytes], unpacked: Callable[[bytes], T]) -> T:
-    """Something from the cache, or made and cached, by the hexadecimal digest of what it is made from."""
+def cached_entry(key: str, make: Callable[[], Any]) -> Any:
+    """What a function makes, from the cache, or made and cached, by the hexadecimal digest of what it is made from.
+
+    That is arrays, texts, numbers and None, and tuples and lists of these, which all come back as tuples.
+    """
     global _writes
     path = cache_folder() / f"{key}{_SUFFIX}"
-    found = _read(path, unpacked)
+    found = _read(path)
     if found is not None:
         return found
-    data = packed(make())
+    data = _packed(make())
     with suppress(OSError, InputError):  # a read-only or full disk: nothing is cached
         path.parent.mkdir(parents=True, exist_ok=True)
         write(path, hashlib.sha256(data).digest() + data)
         if _writes % LOOKED_AT_EVERY == 0:
             _evict(path.parent)
         _writes += 1
-    return unpacked(data)
+    return _unpacked(data)
 
 
 def cache_state() -> CacheState:
@@ -117,7 +126,7 @@ def clear_cache() -> CacheState:
     return state
 
 
-def _read(path: Path, unpacked: Callable[[bytes], T]) -> T | None:
+def _read(path: Path) -> Any:
     try:
         data = path.read_bytes()
     except OSError:
@@ -125,7 +134,7 @@ def _read(path: Path, unpacked: Callable[[bytes], T]) -> T | None:
     try:
         if hashlib.sha256(data[_CHECKSUM:]).digest() != data[:_CHECKSUM]:
             raise ValueError("the checksum does not match")
-        found = unpacked(data[_CHECKSUM:])
+        found = _unpacked(data[_CHECKSUM:])
     except Exception:  # another program's file, or a faulty disk: make it anew
         path.unlink(missing_ok=True)
         return None
@@ -159,33 +168,30 @@ def _entries(folder: Path) -> list[tuple[float, int, Path]]:
     return found
 
 
-def _packed(found: ConvexPieces) -> bytes:
-    corners = [np.array(piece.geometry.points()) for piece in found.pieces]
-    faces = [hull_triangles(piece.geometry) for piece in found.pieces]
-    told = json.dumps([found.added_volume, found.notes]).encode()
-    buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        corners=np.vstack(corners),
-        corner_count=np.array([len(part) for part in corners]),
-        faces=np.vstack(faces),
-        face_count=np.array([len(part) for part in faces]),
-        centre=np.array([piece.placement.translation for piece in found.pieces]),
-        volume=np.array([piece.volume for piece in found.pieces]),
-        told=np.frombuffer(told, dtype=np.uint8),
-    )
-    return buffer.getvalue()
+def _packed(value: Any) -> bytes:
+    """A value as bytes: the length of its text in JSON, this text, then the numbers of all arrays."""
+    parts: list[bytes] = []
+
+    def plain(one: Any) -> Any:
+        if isinstance(one, np.ndarray):
+            parts.append(one.tobytes())
+            return {"type": one.dtype.str, "shape": one.shape}
+        return [plain(each) for each in one] if isinstance(one, (tuple, list)) else one
+
+    text = json.dumps(plain(value)).encode()
+    return zlib.compress(b"".join([len(text).to_bytes(8, "little"), text, *parts]), 1)
 
 
-def _unpacked(data: bytes) -> ConvexPieces:
-    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        corners = np.split(arrays["corners"], np.cumsum(arrays["corner_count"])[:-1])
-        faces = np.split(arrays["faces"], np.cumsum(arrays["face_count"])[:-1])
-        pieces = tuple(
-            Piece(coal_convex(points, triangles), pin.SE3(np.eye(3), centre), float(volume))
-            for points, triangles, centre, volume in zip(
-                corners, faces, arrays["centre"], arrays["volume"], strict=True
-            )
-        )
-        added, notes = json.loads(arrays["told"].tobytes())
-    return ConvexPieces(pieces, float(added), tuple(notes))
+def _unpacked(packed: bytes) -> Any:
+    data = zlib.decompress(packed)
+    at = 8 + int.from_bytes(data[:8], "little")
+
+    def made(one: Any) -> Any:
+        nonlocal at
+        if isinstance(one, dict):
+            found = np.frombuffer(data, one["type"], math.prod(one["shape"]), at).reshape(one["shape"]).copy()
+            at += found.nbytes
+            return found
+        return tuple(map(made, one)) if isinstance(one, list) else one
+
+    return made(json.loads(data[8:at]))

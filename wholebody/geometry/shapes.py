@@ -14,34 +14,19 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array, brief
-from wholebody.base.checks import array, path, shown
+from wholebody.base.checks import array, listed, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.convex import CONCAVITY, VERTICES, check_mesh, convex_pieces
-from wholebody.geometry.hull import check_points, hull_piece
+from wholebody.geometry.hull import SIDES, check_points, cylinder_pieces, hull_piece, torus_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.placement import unit_vector
-from wholebody.geometry.polygonal import SIDES, cylinder_pieces, torus_pieces
 
 LENGTH = Range(SMALLEST, LARGEST, "m")
 Length: TypeAlias = Annotated[float, LENGTH]
 Lengths: TypeAlias = Annotated[tuple[float, float, float], Vector(3, LENGTH)]
-
-__all__ = [
-    "Box",
-    "Capsule",
-    "Cylinder",
-    "Ellipsoid",
-    "HalfSpace",
-    "Hull",
-    "Mesh",
-    "Piece",
-    "Shape",
-    "Sphere",
-    "Torus",
-]
 
 
 class Shape(Checked, ABC):
@@ -370,3 +355,37 @@ class Mesh(Shape):
     def added_volume(self) -> float:
         """Volume that the convex pieces add to the closed parts of the mesh, as a share of it."""
         return self.convexified().added_volume
+
+
+@dataclass(frozen=True, eq=False)
+class Compound(Shape):
+    """Shapes that are one thing.
+
+    Attributes:
+        parts: each shape, and its placement as a pin.SE3.
+
+    Raises:
+        InputError: other parts, or none.
+    """
+
+    parts: tuple[tuple[Shape, pin.SE3], ...]
+
+    def __post_init__(self) -> None:
+        wanted = "[(wb.Box((0.1, 0.1, 0.1)), pin.SE3.Identity())]"
+        parts = tuple(listed(self.parts, "Compound parts", wanted))
+        for part in parts:
+            pair = isinstance(part, (tuple, list)) and len(part) == 2
+            placed = pair and isinstance(part[0], Shape) and isinstance(part[1], pin.SE3)
+            if not (placed and np.isfinite(part[1].homogeneous).all()):
+                raise InputError(f"Compound: a part is {shown(part)}; give pairs such as {wanted}")
+        if not parts:
+            raise InputError(f"Compound: there are no parts; give pairs such as {wanted}")
+        object.__setattr__(self, "parts", tuple((shape, pin.SE3(at)) for shape, at in parts))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """The pieces of all shapes."""
+        return tuple(
+            Piece(piece.geometry, at * piece.placement, piece.volume)
+            for shape, at in self.parts
+            for piece in shape.pieces()
+        )

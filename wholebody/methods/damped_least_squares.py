@@ -27,9 +27,8 @@ from wholebody.base.fields import Checked
 from wholebody.figures.state import State
 from wholebody.methods import base
 from wholebody.methods.base import Iterations, TimeLimit, Tolerance, UnsupportedTermError
-from wholebody.methods.conclusion import Ending
+from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import Control
-from wholebody.methods.descents import Descends
 from wholebody.methods.differential import REST
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace

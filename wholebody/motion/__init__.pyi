@@ -5,8 +5,7 @@ from wholebody.motion.checking import ClipCheck as ClipCheck
 from wholebody.motion.clip_torques import Torques as Torques, torques as torques
 from wholebody.motion.judging import AvoidanceReport as AvoidanceReport, Avoided as Avoided
 from wholebody.motion.measures import MotionBounds as MotionBounds
-from wholebody.motion.posing import posed as posed
-from wholebody.motion.reading import read_skeleton as read_skeleton
+from wholebody.motion.reading import posed as posed, read_skeleton as read_skeleton
 from wholebody.motion.resting_hands import RestingHands as RestingHands
 from wholebody.motion.retargeting import bone_errors as bone_errors
 from wholebody.motion.skeleton import SkeletonMotion as SkeletonMotion

@@ -1,9 +1,9 @@
-"""Clips: postures of a figure at a fixed time step, and their derivatives on the configuration manifold."""
+"""Clips: postures of a figure at a fixed time step, their derivatives on the manifold, and things that move beside."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,14 +12,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import array, instance, listed, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
+from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.motion.mirroring import PLACEMENT, mirrored
-from wholebody.motion.thing_tracks import between, thing_tracks
 
 ROOT_SIZE = 7  # values of a free root
 LARGEST = 1e6  # of a value, radians or metres
@@ -192,7 +193,7 @@ class Clip(Shown):
         if frames > MOST_FRAMES:
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
         places = [min(k * dt / self.dt, len(self) - 1.0) for k in range(frames)]
-        things = {name: np.array([between(track, place) for place in places]) for name, track in self.things.items()}
+        things = {name: np.array([_placed(track, place) for place in places]) for name, track in self.things.items()}
         return Clip(self.figure, np.array([self._between(place) for place in places]), dt, self.name, things)
 
     def mirrored(self) -> Clip:
@@ -341,3 +342,44 @@ def column_name(figure: Figure, column: int) -> str:
             what = ("the root" if name == "root" else name) if name in figure.roots else f"joint {name}"
             return what if joint.nq == 1 else f"value {column - joint.idx_q} of {what}"
     return f"value {column}"
+
+
+def thing_tracks(given: Mapping[str, Iterable[PlacementLike]], frames: int, what: str) -> dict[str, Array]:
+    """Placements (n, 7) of things by name, checked; `what` names the input in messages.
+
+    Raises:
+        InputError: another number of placements than frames, or one that cannot be read; the frame is named.
+    """
+    found = {}
+    for name, track in given.items():
+        checks.text(name, f"{what}: the name of a thing")
+        rows = checks.listed(track, f"{what}: things: {name}", "a placement for each frame")
+        if len(rows) != frames:
+            raise InputError(
+                f"{what}: things: {name} has {len(rows)} placements for {frames} frames; give one for each"
+            )
+        placed = [placement(row, f"{what}: things: {name}: frame {frame}") for frame, row in enumerate(rows)]
+        values = np.array([pin.SE3ToXYZQUAT(one) for one in placed]).reshape(-1, 7)
+        steady(values[:, 3:])
+        values.setflags(write=False)
+        found[name] = values
+    return found
+
+
+def steady(turns: Array) -> Array:
+    """Quaternions (n, ..., 4), in place, each of the sign with which it is nearest to the one before."""
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
+    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
+    return turns
+
+
+def _placed(track: Array, place: float) -> Array:
+    """The placement (7,) at a number of frames from the first one, which need not be whole."""
+    first = int(np.clip(np.floor(place), 0, max(0, len(track) - 2)))
+    last = min(first + 1, len(track) - 1)
+    ends = (pin.XYZQUATToSE3(track[frame]) for frame in (first, last))
+    start, end = ends
+    share = float(np.clip(place - first, 0.0, 1.0))
+    turn = start.rotation @ pin.exp3(share * pin.log3(start.rotation.T @ end.rotation))
+    way = (1.0 - share) * start.translation + share * end.translation
+    return np.asarray(pin.SE3ToXYZQUAT(pin.SE3(turn, way)))

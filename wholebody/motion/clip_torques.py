@@ -18,12 +18,11 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.proximity import Contacts
-from wholebody.motion.clip import Clip, same_joints
+from wholebody.motion.clip import Clip, same_joints, steady
 from wholebody.motion.footholds import RestLimits
 from wholebody.motion.inverse_dynamics import FRICTION, ROOT, InverseDynamics, Stand, Touches, foot_wrenches
 from wholebody.motion.stance import FEET, own_feet, standing_feet
 from wholebody.motion.strength import Strength, torque_limits
-from wholebody.motion.thing_tracks import steady
 from wholebody.scene.scene import Scene
 
 CUTOFF = 6.0

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
+from wholebody.figures.model_check import joint_of
 from wholebody.motion.avoider import MethodResult, Work
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
@@ -281,7 +282,7 @@ def _jumps(was: ClipCheck) -> str:
     if not jumps.any():
         return ""
     gap, column = np.unravel_index(int(np.where(jumps, steps, 0.0).argmax()), steps.shape)
-    joint = next(name for name, j in zip(model.names, model.joints, strict=True) if 0 <= column - j.idx_v < j.nv)
+    joint = model.names[joint_of(model, int(column))]
     met = max(was.contacts, key=lambda contact: contact.between[gap])
     more = int(jumps.any(axis=1).sum()) - 1
     also = f", and jumps {more} times more" if more else ""

@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, thing_tracks
 from wholebody.motion.held_points import held_points, touching_points
 from wholebody.motion.holds import Holds, Touched
 from wholebody.motion.posture_fit import Fitter
@@ -43,7 +43,6 @@ from wholebody.motion.thing_contacts import (
     still_things,
     surface_of,
 )
-from wholebody.motion.thing_tracks import thing_tracks
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: frames that overlap by so much are told

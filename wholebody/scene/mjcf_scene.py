@@ -16,8 +16,7 @@ from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
 from wholebody.figures.mjcf.compiled import Compiled, is_mjcf, placement
 from wholebody.figures.mjcf.figure import SHAPES, geom_shape, height_field, mjcf_figure
-from wholebody.geometry.compound import Compound
-from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
 

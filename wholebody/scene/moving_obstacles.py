@@ -40,7 +40,6 @@ class MovingScene:
         names: the things that move, in the order of the configuration.
         owners: the segment or thing that each piece is part of.
         figure_nq: numbers of the figure in a configuration; they come first.
-        scene_pairs: number of pairs that the scene has itself; those after them are pairs of two things.
         centres: thing to its centre (3,) in its own frame, metres.
         joints: thing to the joint that carries it.
     """
@@ -56,7 +55,6 @@ class MovingScene:
         self.model = built.model.copy()
         with built.lock:
             self.geometry = built.geometry.copy()
-        self.scene_pairs = len(self.geometry.collisionPairs)
         self.centres = {name: self._centre(name) for name in self.names}
         self.joints = {name: self._add_joints(name) for name in self.names}
         self._still = [k for name, pieces in built.pieces_of.items() if name not in self.joints for k, _ in pieces]

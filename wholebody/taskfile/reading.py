@@ -11,9 +11,8 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import is_file, parsed_toml, read_text
 from wholebody.figures.figure import Figure
-from wholebody.taskfile.kinds import Form, Key, Table, values_of
+from wholebody.taskfile.kinds import Form, Key, Table, Where, values_of
 from wholebody.taskfile.schema import TABLES, TOP
-from wholebody.taskfile.where import Where
 
 _ROBOT = "a robot; name it by path = {0!r} in the [figure] of a task file, or see it by `wholebody show {0}`"
 OTHERS = {".urdf": _ROBOT, ".xml": _ROBOT, ".json": "no {1}; `wholebody show {0}` shows a result"}

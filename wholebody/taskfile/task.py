@@ -27,8 +27,8 @@ from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
+from wholebody.taskfile.kinds import Where
 from wholebody.taskfile.reading import Contents, Entry, read_contents
-from wholebody.taskfile.where import Where
 from wholebody.tasks import Soft
 
 _OF_BODIES = ("density", "mass", "material", "velocity", "angular_velocity", "joints")

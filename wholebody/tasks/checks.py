@@ -13,6 +13,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, TermError, UndefinedTermError, either
+from wholebody.figures.model_check import joint_of
 from wholebody.figures.state import UNIT_TOLERANCE, State, Wrench
 from wholebody.geometry.placement import FARTHEST
 from wholebody.scene.scene import Scene
@@ -151,8 +152,8 @@ def check_frozen(bounds: Iterable[Bound], scene: Scene, state: State) -> None:
         low, high = bound.bounds(state, None)
         wrong = np.flatnonzero((high < least) | (low > most))
         if len(wrong):
-            joint = next(j for j in scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-            message = f"{type(bound).__name__} keeps {scene.model.names[joint.id]} where it starts"
+            name = scene.model.names[joint_of(scene.model, int(wrong[0]))]
+            message = f"{type(bound).__name__} keeps {name} where it starts"
             raise InputError(f"{message}, out of its limits; start it within them")
 
 

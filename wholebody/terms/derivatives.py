@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
+from wholebody.figures.model_check import joint_of
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Constraint, Goal, Measure
@@ -105,7 +106,7 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
             entry = float(given[row, dof]), float(measured[row, dof])
             worst = (float(difference[row, dof]) / scale, row, dof, *entry, here, scale)
     share, row, dof, mine, true, where, scale = worst
-    joint = next((j for j in range(1, model.njoints) if 0 <= dof - model.idx_vs[j] < model.nvs[j]), 0)
+    joint = joint_of(model, dof)
     name = next((root for root, k in figure.roots.items() if k == joint), str(model.names[joint]))
     return DerivativeCheck(
         type(term).__name__, max(share, 0.0) * scale, row, name, mine, true, where, share <= AGREEMENT

@@ -6,8 +6,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
-from wholebody.figures.reach_cones import PARALLEL
-from wholebody.figures.reach_cones import TOUCHING as ON_EDGE
+from wholebody.figures.motion_ranges import PARALLEL
+from wholebody.figures.motion_ranges import TOUCHING as ON_EDGE
 from wholebody.tasks.axis import NO_ANGLE, STEEPEST, TOUCHING
 from wholebody.tasks.range_of_motion import OPPOSITE
 from wholebody.terms.entries import Integers

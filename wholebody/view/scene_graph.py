@@ -10,7 +10,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.placement import quaternions
-from wholebody.motion.thing_tracks import steady
+from wholebody.motion.clip import steady
 from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
 from wholebody.view.server import Command, Server, Store

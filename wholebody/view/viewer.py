@@ -22,7 +22,7 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
-from wholebody.view.composition import Composition, panel
+from wholebody.view.composition import Composition, panel, timed
 from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph
@@ -161,7 +161,6 @@ class Viewer:
                 f"overlaps has {len(marked)} entries and the motion {len(postures)} postures; give as many"
             )
         marked = [checked_overlaps(one, f"overlaps[{number}]") for number, one in enumerate(marked)]
-        from wholebody.tracking.inner_paths import timed
 
         made, played = self._composition.keyframe, timed(postures, getattr(motion, "paths", ()), step)
         keyframes = [made(q, problem, overlaps=marked[k]) for q, k in zip(played.q, played.frames, strict=True)]

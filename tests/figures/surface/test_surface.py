@@ -12,9 +12,9 @@ import pinocchio as pin
 import pytest
 
 from wholebody.figures import load
+from wholebody.figures import surface as surfaces
 from wholebody.figures.anthropometry import design_cases
 from wholebody.figures.surface import Bone, Surface, making, surface_of
-from wholebody.figures.surface import surface as surfaces
 from wholebody.figures.surface.making import Part, person_parts
 from wholebody.figures.surface.person_shape import PersonShape
 from wholebody.geometry.mesh_cache import VARIABLE, cache_state

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.qp.before_contact import at_its_place
+from wholebody.methods.qp.start_postures import at_its_place
 
 BOX = (0.35, -0.25, 1.0)
 ASKED: dict[str, dict[str, list[Any]]] = {

@@ -9,7 +9,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.stability.catalogue import cases
-from wholebody.methods.qp.cancelling import posture_apart
+from wholebody.methods.qp.start_postures import posture_apart
 
 JOINT = (
     '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"/><axis xyz="0 0 1"/>'

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.assessment.postures import Numbers, judged
+from wholebody.assessment.posture import Numbers, judged_postures
 from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.methods.qp.chain_kernel import reach_all
 from wholebody.tasks.base import Goal
@@ -79,7 +79,7 @@ def test_the_judge_of_many_says_what_the_judge_of_one_says(scene, two_arms):
     seen = np.zeros(5, dtype=bool)
     for problems in (posed(scene, 25, clearance=0.02), relative):
         postures = rng.uniform(-3.0, 3.0, (len(problems), problems[0].scene.model.nq))
-        many = np.transpose(judged(problems[0], Numbers.of(problems), postures))
+        many = np.transpose(judged_postures(problems[0], Numbers.of(problems), postures))
         for problem, q, numbers in zip(problems, postures, many, strict=True):
             one = wb.assess(problem, q)
             found = [one.goal_error, one.goal_angle, one.penetration, one.clearance_violation, one.limit_violation]

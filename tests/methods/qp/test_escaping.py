@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.methods.qp.escaping import ProjectionRows, free_end
 from wholebody.methods.qp.settings import ESCAPE
+from wholebody.methods.qp.tracking import ProjectionRows, free_end
 
 RADIUS = 0.1
 

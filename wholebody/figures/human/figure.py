@@ -18,9 +18,8 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_angles, finger_degrees, finger_effort, finger_pair, is_finger
 from wholebody.figures.human.details import SPREAD, sphere_names
 from wholebody.figures.human.spec import human_solids, human_spec
-from wholebody.figures.motion_ranges import human_ranges
+from wholebody.figures.motion_ranges import ReachCone, human_ranges
 from wholebody.figures.postures import stand
-from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.self_pairs import drop_rigid_pairs
 from wholebody.figures.tables import named_angles, table
 

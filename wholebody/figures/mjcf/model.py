@@ -17,7 +17,7 @@ from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.figures.description import ROOT_JOINT, JointCone
 from wholebody.figures.mjcf.compiled import BALL, FREE, HINGE, SLIDE, Compiled, placement
 from wholebody.figures.model_check import along_z
-from wholebody.figures.reach_cones import ReachCone
+from wholebody.figures.motion_ranges import ReachCone
 
 
 class Law(NamedTuple):

@@ -56,9 +56,9 @@ from wholebody.figures.motion_ranges import (
     EllipseAxis,
     EllipticRange,
     MotionRange,
+    ReachCone,
     TwistRange,
 )
-from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.self_pairs import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
 

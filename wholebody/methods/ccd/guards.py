@@ -1,21 +1,22 @@
 """Guards: joints that have left a reach cone or a range of motion are brought back, or else stay at their last values.
 
 Cones and ranges that share joints, those of a shoulder or of a leg, are kept together. The cones are those of
-`wholebody.figures.reach_cones`, the ranges those of `ranges`.
+`wholebody.figures.motion_ranges`; what leaves a range is brought back by the least change of its joints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import atan2
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.figures.reach_cones import ReachCone
-from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, three
-from wholebody.methods.ccd.ranges import LimbGuard, RangeGuard, range_guards
+from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, ReachCone, TwistRange
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, floats, rotated, seen_from, three
 from wholebody.methods.ccd.sweep import Aims
 
 
@@ -55,6 +56,156 @@ class Polygon:
         # a share of the way to the middle; larger than rounding
         found = np.cos(angle) * np.array(direction) - np.sin(angle) * inward + 1e-6 * self._cone.visible
         return three(found / np.linalg.norm(found))
+
+
+INWARD = 1e-9  # margin inside a range, as a share of an ellipse and in radians of a twist; larger than rounding
+ROUNDING = 1e-12  # rad
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class _Sum:
+    """A weighted sum of joint angles, of which some are nodes and the others stay as they are."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, joints: dict[str, float]) -> None:
+        ids = {figure.joint_id(name): factor for name, factor in joints.items()}
+        self.nodes = tuple(limbs.node_of[joint] for joint in ids if joint in limbs.node_of)
+        self.factors = np.array([factor for joint, factor in ids.items() if joint in limbs.node_of])
+        self._others = [
+            (figure.model.joints[joint].idx_q, factor) for joint, factor in ids.items() if joint not in limbs.node_of
+        ]
+        self._limbs, self._rows, self._rest = limbs, np.array(self.nodes, dtype=np.intp), 0.0
+
+    def read(self, q: Array) -> None:
+        """Read the joints that are no nodes from the posture q (nq,)."""
+        self._rest = sum(factor * float(q[place]) for place, factor in self._others)
+
+    @property
+    def value(self) -> float:
+        """The sum, radians."""
+        return self._rest + float(self.factors @ self._limbs.values[self._rows])
+
+    def lessen(self, excess: float) -> None:
+        """Change the sum by -excess by the least change of the nodes; what a limit stops is left to the others."""
+        limbs, left = self._limbs, list(range(len(self.nodes)))
+        while left and abs(excess) > ROUNDING:
+            square = float(sum(self.factors[k] ** 2 for k in left))
+            gone = 0.0
+            for k in tuple(left):
+                node, factor = self.nodes[k], float(self.factors[k])
+                value = float(limbs.values[node])
+                wanted = value - factor * excess / square
+                new = min(max(wanted, float(limbs.lower[node])), float(limbs.upper[node]))
+                limbs.values[node] = new
+                gone += factor * (value - new)
+                if new != wanted:
+                    left.remove(k)
+            excess -= gone
+
+
+class _SumsGuard:
+    """Keeps sums of joint angles; `nodes` are those that change them."""
+
+    def __init__(self, limbs: Limbs, sums: Sequence[_Sum]) -> None:
+        self._limbs, self._sums = limbs, sums
+        self.nodes = tuple(node for angle in sums for node in angle.nodes)
+
+    def read(self, q: Array, data: Any) -> None:
+        """Read what the limbs do not move at the posture q (nq,)."""
+        for angle in self._sums:
+            angle.read(q)
+
+
+class CoupledGuard(_SumsGuard):
+    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
+        self._sum, self._bound = _Sum(figure, limbs, dict(part.joints)), part.bound
+        super().__init__(limbs, [self._sum])
+
+    def inside(self) -> bool:
+        """Whether the sum is within its bound."""
+        return self._sum.value <= self._bound + ROUNDING
+
+    def turn_back(self) -> None:
+        """Move the joints by the least that is needed, each within its limits, and call `limbs.forward`."""
+        self._sum.lessen(self._sum.value - self._bound)
+        self._limbs.forward()
+
+
+class EllipticGuard(_SumsGuard):
+    """Keeps angles on or in an ellipse; see `EllipticRange`."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, part: EllipticRange) -> None:
+        super().__init__(limbs, [_Sum(figure, limbs, dict.fromkeys(axis.joints, 1.0)) for axis in part.axes])
+        self._axes = list(zip(self._sums, part.axes, strict=True))
+
+    def inside(self) -> bool:
+        """Whether the angles are in the ellipse."""
+        return self._square() <= 1.0
+
+    def turn_back(self) -> None:
+        """Scale the angles to the edge, each joint within its limits, and call `limbs.forward`."""
+        less = 1.0 - (1.0 - INWARD) / self._square() ** 0.5
+        for angle, axis in self._axes:
+            angle.lessen(less * (axis.offset + angle.value))
+        self._limbs.forward()
+
+    def _square(self) -> float:
+        """The sum of the squares of the angles, each as a share of its limit."""
+        shares = []
+        for angle, axis in self._axes:
+            value = axis.offset + angle.value
+            shares.append(value / (axis.upper if value > 0.0 else axis.lower))
+        return sum(share * share for share in shares)
+
+
+class LimbGuard:
+    """Keeps the direction or the turn of a limb in a reference frame; `nodes` are those that turn it there."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, limb: str, reference: str) -> None:
+        self._limbs = limbs
+        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (limb, reference))
+        self.nodes = limbs.between(self._base.node, self._limb.node)
+
+    def read(self, q: Array, data: Any) -> None:
+        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
+        self._limb.read(data)
+        self._base.read(data)
+
+
+class TwistGuard(LimbGuard):
+    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
+
+    def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
+        super().__init__(figure, limbs, part.limb, part.reference)
+        self._part = part
+        self._center = floats(pin.SE3(part.center, np.zeros(3)))
+        self._slope: list[float] = (part.slope @ part.center).tolist()
+
+    def inside(self) -> bool:
+        """Whether the twist is within its bound, after `limbs.forward`."""
+        return self._excess() <= 0.0
+
+    def turn_back(self) -> None:
+        """Turn the limb about its long axis, whose direction decides the bound, and call `limbs.forward`."""
+        limb = self._limb
+        back = pin.exp3(np.array([0.0, 0.0, -self._part.sign * (self._excess() + INWARD)]))
+        targets = [limb.direction(*column) for column in back.T.tolist()]
+        local = [rotated(limb.placement, *axis) for axis in AXES]
+        Aims(self._limbs, [limb.node] * 3, local, targets, [False] * 3).sweep_until(self.nodes, self.inside)
+
+    def _excess(self) -> float:
+        """The twist beyond its bound, radians; negative inside."""
+        (a, b, _), (d, e, _), z = (self._seen(*axis) for axis in AXES)
+        along = sum(w * part for w, part in zip(self._slope, z, strict=True))
+        return float(self._part.sign * atan2(b - d, a + e) - self._part.bound - along)
+
+    def _seen(self, x: float, y: float, z: float) -> Vector:
+        """A direction of the limb in the axes of the central rotation."""
+        return seen_from(self._center, *self._base.seen(*self._limb.direction(x, y, z)))
+
+
+RangeGuard = CoupledGuard | EllipticGuard | TwistGuard
 
 
 class ConeGuard(LimbGuard):
@@ -157,4 +308,11 @@ def guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[Guard]:
 def cone_guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[ConeGuard]:
     """The kept cones that these limbs can leave."""
     made = [ConeGuard(figure, limbs, name) for name in (figure.cones if kept.cones is None else kept.cones)]
+    return [guard for guard in made if guard.nodes]
+
+
+def range_guards(figure: Figure, limbs: Limbs, names: Sequence[str]) -> list[RangeGuard]:
+    """The named ranges that these limbs can leave."""
+    kinds: dict[type, Any] = {CoupledRange: CoupledGuard, EllipticRange: EllipticGuard, TwistRange: TwistGuard}
+    made = [kinds[type(figure.ranges[name])](figure, limbs, figure.ranges[name]) for name in names]
     return [guard for guard in made if guard.nodes]

@@ -26,10 +26,9 @@ from wholebody.methods.base import (
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.terms import Request, read
-from wholebody.methods.conclusion import Ending
+from wholebody.methods.conclusion import Descends, DescentTracker, Ending
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.descents import Descends, DescentTracker
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace

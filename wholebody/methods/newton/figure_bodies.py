@@ -30,6 +30,8 @@ class FigureBodies:
         equations: the joints.
         limits: one row for each limited joint, for the nearer of its two limits; `choose_limits` chooses it.
         q: (nq,) the posture at the last `retract`.
+        step: a posture (nq,), and tangent displacements (nv,) from it within which later ones are kept, for velocity
+            bounds of a frame; None for limits alone.
         data: Pinocchio's, with the placements of the joints at the last `variables` or `retract`.
     """
 
@@ -65,7 +67,7 @@ class FigureBodies:
         self.limits.role = ONE_SIDED
         self.weight = self._weight()
         self._tangent: Indices = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
-        self._step: tuple[Array, Array, Array] | None = None
+        self.step: tuple[Array, Array, Array] | None = None
         self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state_of: Array | None = None
         self._rows_of: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
@@ -144,14 +146,6 @@ class FigureBodies:
         self._reads: Mask = (columns >= 0) & (sliding | (np.arange(14) % 7 >= 3))  # nothing of the world
         self._entries = np.nonzero(self._reads)[0], columns[self._reads]
 
-    def bound_step(self, q: Array, lower: Array, upper: Array) -> None:
-        """Keep later postures within tangent displacements (nv,) of q (nq,), for the velocity bounds of a frame."""
-        self._step = (q, lower, upper)
-
-    def free_step(self) -> None:
-        """Bound later postures by limits alone."""
-        self._step = None
-
     def distance(self, q: Array) -> tuple[Angle, Indices]:
         """One row for each revolute joint, its angle relative to q (nq,); and the joints' tangent indices."""
         return self._rows(np.arange(len(self.angles)), self.angles_at(q).copy()), self._tangent
@@ -213,8 +207,8 @@ class FigureBodies:
                 q[kind.idx_q : kind.idx_q + 2] = np.array((turn[0, 0], turn[1, 0])) / np.hypot(turn[0, 0], turn[1, 0])
             else:
                 q[kind.idx_q] = place.translation @ _axis(kind)
-        if self._step is not None:
-            start, lower, upper = self._step
+        if self.step is not None:
+            start, lower, upper = self.step
             way = np.asarray(pin.difference(self.model, start, q))
             # all joints by the same share: clipping them one by one would change the direction of the motion
             room = np.where(way > 0.0, upper, -lower)

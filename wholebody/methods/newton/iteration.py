@@ -291,8 +291,7 @@ class Iteration:
         if hard + goal <= 0.1 * self.tolerance:
             return True
         gain = before[1] - promised[1]
-        # after a full step towards the goals curved equations are violated by its square
-        if hard <= max(funnel, before[1] * before[1]) and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
+        if hard <= funnel and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
             return True
         restored = before[0] - hard >= STEPS.restored * max(before[0] - promised[0], 0.0) and hard < before[0]
         return restored and (before[0] > self.tolerance or goal <= before[1])

@@ -15,9 +15,8 @@ from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import TOLERANCE, SolvingTracker, UnsupportedTermError, check_problem
-from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
-from wholebody.methods.descents import Descends
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
@@ -147,7 +146,7 @@ class NewtonTracker(SolvingTracker):
             if self._bounded and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
                 state = self.workspace.state.update(q)
                 ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
-                active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
+                active_system.bodies.step = q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0)
             found, spent = None, 0
             if len({goal.weight for goal in self.problem.goals}) > 1:
                 found = self._satisfied(active_system, q, enough, even=True)
@@ -214,5 +213,5 @@ class NewtonTracker(SolvingTracker):
             self._lay_out()
         self._active_system.retarget()
         self._active_system.objective.follow()
-        self._active_system.bodies.free_step()
+        self._active_system.bodies.step = None
         return self._active_system

@@ -10,9 +10,8 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
 from wholebody.methods.base import Iterations, TimeLimit, Tolerance, UnsupportedTermError, check_problem, refusal
-from wholebody.methods.conclusion import Ending
+from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import BUDGET, Control
-from wholebody.methods.descents import Descends
 from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError, held
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported

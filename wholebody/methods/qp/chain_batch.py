@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.assessment.postures import Judged, Numbers, judged
+from wholebody.assessment.posture import Judged, Numbers, judged_postures
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
 from wholebody.methods.conclusion import assessed_tolerance
@@ -55,7 +55,7 @@ class Batch(NamedTuple):
             assert chain is not None
             first = _First.of(self, chain, entries)
             q, iterations, ended = first.ends()
-            judgement = judged(problem, self.numbers, q)
+            judgement = judged_postures(problem, self.numbers, q)
             blocked = ended & ~(judgement.clearance_violation <= 0.0)
             # Where the end of least effort is not free, the next one is looked at while no descent can lead to less.
             turn = blocked.copy()
@@ -64,7 +64,7 @@ class Batch(NamedTuple):
                 if not len(some := np.flatnonzero(turn)):
                     break
                 q[some] = first.postures(some, rank)
-                judgement.put(some, judged(problem, self.numbers.of_some(some), q[some]))
+                judgement.put(some, judged_postures(problem, self.numbers.of_some(some), q[some]))
                 blocked[some] = ~(judgement.clearance_violation[some] <= 0.0)
             left = np.flatnonzero(~ended | blocked)  # one by one
             ended[left] = False
@@ -73,7 +73,7 @@ class Batch(NamedTuple):
                 if met is not None and met.complete:
                     q[k], iterations[k], ended[k] = met.q, len(met.trace), True
             if len(left):
-                judgement.put(left, judged(problem, self.numbers.of_some(left), q[left]))
+                judgement.put(left, judged_postures(problem, self.numbers.of_some(left), q[left]))
         solved = ended & judgement.meets(assessed_tolerance(self.settings.tolerance))
         return Answers(solved, q, iterations, judgement, control.seconds)
 

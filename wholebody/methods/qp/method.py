@@ -10,9 +10,8 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture, shown
 from wholebody.base.errors import InputError
 from wholebody.methods.base import check_problem
-from wholebody.methods.conclusion import Ending, concluded, meets
+from wholebody.methods.conclusion import Descends, Ending, concluded, meets
 from wholebody.methods.control import Control
-from wholebody.methods.descents import Descends
 from wholebody.methods.qp.chain import Met, from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
 from wholebody.methods.qp.multistart import Multistart

@@ -14,14 +14,13 @@ from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.qp.before_contact import at_its_place, before_contact
-from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
 from wholebody.methods.qp.iterates import Attempt, LocalSolution, held, moving
 from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
+from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
 from wholebody.methods.starts import Minima, alike, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace

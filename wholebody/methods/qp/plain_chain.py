@@ -219,8 +219,9 @@ class Chains:
         if joints not in self._chains:
             model = self._model
             path = sorted({above for joint in joints for above in list(model.supports[joint])} - {0})
-            plain = bool(path) and all(_is_plain(model.joints[joint]) for joint in path)
-            self._chains[joints] = PlainChain(model, self._limits, tuple(path)) if plain else None
+            kinds = [model.joints[joint] for joint in path]
+            plain = all(one.nv == 1 and one.shortname().startswith(("JointModelR", "JointModelP")) for one in kinds)
+            self._chains[joints] = PlainChain(model, self._limits, tuple(path)) if path and plain else None
         return self._chains[joints]
 
     def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
@@ -251,10 +252,6 @@ def _support(parents: list[int]) -> NDArray[np.int8]:
         support[k + 1] = support[parent]
         support[k + 1, k] = 1
     return support
-
-
-def _is_plain(joint: pin.JointModel) -> bool:
-    return bool(joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))
 
 
 @with_loops("wholebody.methods.qp.chain_kernel")

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import flag, posture
+from wholebody.base.compiled import with_loops
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
+from wholebody.figures.state import root_freedoms
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.methods.base import TOLERANCE, FrameStep, Method, SolvingTracker, begun, goal_error, nearest_to
 from wholebody.methods.control import BUDGET, budget_for_sweep
-from wholebody.methods.qp.escaping import ProjectionRows, free_end
-from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver, WorkingSet
 from wholebody.methods.qp.step_program import QPStep, StepProgram
-from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
+from wholebody.methods.qp.turning import predicted_distances, unseen_by_rows
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
 from wholebody.solution import Solution
@@ -55,7 +55,7 @@ class QPTracker(SolvingTracker):
         """
         super().__init__(method, problem, dt)
         solver.load()  # not in the middle of a drag
-        compiled_escape()
+        compiled_kernel()
         self._working_set, self._query_distance = WorkingSet(solver), TRACKING.least_within
         self._alone = OneAtATime("tracker")
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
@@ -203,7 +203,7 @@ class QPTracker(SolvingTracker):
         curved = share * motion * (share * answer.turn + TRACKING.off)  # roughly, and rather too much
         if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
-            if curved > least_unseen(answer.asked):
+            if curved > unseen_by_rows(answer.asked):
                 bent = program.turning.linearisation_error(at, program.rows, displacement)
             if bent > 0.0:
                 displacement, share, following = self._corrected(at, displacement, share, bent > TRACKING.midway)
@@ -329,3 +329,55 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
         iterations=sum(step.iterations for step in steps), share=min(step.share for step in steps),
         programs=dict(sum((Counter(step.programs) for step in steps), Counter[str]())),
     )  # fmt: skip
+
+
+class ProjectionRows(NamedTuple):
+    """What a posture is projected out of: rows of near contacts and of constraints."""
+
+    depth: float  # greatest of any pair, metres
+    rows: Array  # (k, nv) rates of what must not become negative
+    room: Array  # (k,) how much that is, metres and radians
+    box: Array  # (2, nv) displacements that bounds allow
+
+
+def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], ProjectionRows]) -> Array | None:
+    """A posture (nq,) that is free to a depth `out` [m], whatever passes; None if a frame's budget finds none.
+
+    For the end of a frame in which a thing came faster than the figure can move. From the posture before and from
+    random ones within the bounds, near pairs are projected out of each other one after the other (Kaczmarz, 1937). A
+    program would leave all of them violated where not all can be parted to first order.
+    """
+    project, box = compiled_kernel().project, rows_at(q).box.copy()
+    for start in _starts(model, box):
+        gone, least, weak = start, np.inf, 0
+        for _ in range(ESCAPE.rounds):
+            if BUDGET.over:
+                return None
+            here = np.asarray(pin.integrate(model, q, gone))
+            at = rows_at(here)
+            if at.depth <= out:
+                return here
+            weak += at.depth > ESCAPE.worth * least
+            if weak == ESCAPE.weak:
+                break
+            least = min(least, at.depth)
+            gone = gone.copy()
+            project(at.rows, at.room, box[0], box[1], gone)
+    return None
+
+
+def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
+    """Displacements (nv,) to begin at, all within a box (2, nv)."""
+    yield np.zeros(model.nv)
+    low, high = np.clip(box, -ESCAPE.farthest, ESCAPE.farthest)
+    rng, joints = np.random.default_rng(0), ~root_freedoms(model)
+    for _ in range(ESCAPE.random):
+        begun = rng.uniform(low, high)
+        begun[joints] *= rng.uniform()
+        yield begun
+
+
+@with_loops("wholebody.methods.qp.dense_kernel")
+def compiled_kernel(dense_kernel: Any) -> None:
+    """The projection, compiled or read back."""
+    dense_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))

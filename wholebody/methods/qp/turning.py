@@ -68,12 +68,7 @@ def compiled_kernel(turning_kernel: Any) -> None:
     )  # fmt: skip
 
 
-def least_unseen(asked: float) -> float:
-    """The least of `unseen_by_rows` where at least this distance is asked of all contacts."""
-    return min(max(asked, TRACKING.inside), TRACKING.unseen)
-
-
-def unseen_by_rows(asked: Array) -> Array:
+def unseen_by_rows(asked: Array | float) -> Array:
     """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
     unseen: Array = np.minimum(np.maximum(asked, TRACKING.inside), TRACKING.unseen)
     return unseen

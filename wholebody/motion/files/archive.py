@@ -20,9 +20,8 @@ from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import load
-from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
+from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE, steady
 from wholebody.motion.files.base import Frames, Motion
-from wholebody.motion.thing_tracks import steady
 
 VERSION = 1  # of the layout of the arrays
 APART = 1e-3  # m: joints of one figure are as far from each other, but for what another version makes of a person

@@ -15,11 +15,11 @@ from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
-from wholebody.geometry.compound import Compound
 from wholebody.geometry.placement import FARTHEST, unit_vector
 from wholebody.geometry.shapes import (
     Box,
     Capsule,
+    Compound,
     Cylinder,
     Ellipsoid,
     HalfSpace,

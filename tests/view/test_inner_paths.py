@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.tracking.inner_paths import timed
 from wholebody.tracking.loop import follow
+from wholebody.view.composition import timed
 
 DT = 0.1
 
