@@ -50,9 +50,9 @@ class Solution(Shown):
             so there may be fewer entries than iterations.
         method: name of the method and of its solver.
         message: one sentence that explains the status.
-        programs: number of quadratic programs that each solver closed, such as {"osqp": 1, "active set": 7}. There,
-            "active set" is the hot start, "semismooth newton" closed what neither did, and "not exact" are programs
-            that none closed. Empty for methods without programs. Iterations of qp whose entry of the trace is called
+        programs: number of quadratic programs that each solver closed, such as {"active set": 7, "semismooth newton":
+            1}. There, "active set" is the hot start, "semismooth newton" closed what did not settle, and "not exact"
+            are programs that none closed. Empty for methods without programs. Iterations of qp whose entry of the trace is called
             "seed" have none: each is a descent by damped least squares.
 
     Examples:

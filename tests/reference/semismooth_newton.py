@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.reference.active_set import minimise_on_face
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.active_set_kernel import STILL, WHOLE
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
@@ -33,29 +33,32 @@ def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[
         if point is None:
             break
         way = np.where(lower | upper, 0.0, point.x - x)
-        step, hit = _longest(program, x, way, lower | upper)
-        best = _line_minimum(program, x, way, step)
-        x = np.clip(x + best * way, program.lower, program.upper)
-        if best == step and hit >= 0:  # a bound is in the way: it holds from now on
+        met = False
+        while True:  # the way bends at bounds, which hold from then on
+            before = program.elastic @ x < program.least
+            step, hit = _longest(program, x, way)
+            best = _line_minimum(program, x, way, step)
+            x = np.clip(x + best * way, program.lower, program.upper)
+            if best != step or hit < 0:
+                break
             lower[hit], upper[hit] = way[hit] < 0.0, way[hit] > 0.0
+            way[hit], met = 0.0, True
+        whole = best == 1.0 and np.array_equal(program.elastic @ x < program.least, before)
+        if met or (best * float(np.abs(way).max(initial=0.0)) > STILL and not whole):
             continue
-        whole = best == 1.0 and np.array_equal(program.elastic @ x < program.least, active.elastic)
-        if best * float(np.abs(way).max(initial=0.0)) > STILL and not whole:
-            continue
-        # the minimum of the face: let the bound go that holds the most
+        # the minimum of the face: let the bounds go that hold on the wrong side
         pull = program.gradient(x) / program.diagonal
-        wrong = np.where(lower, -pull, np.where(upper, pull, 0.0))
-        worst = int(np.argmax(wrong))
-        if wrong[worst] <= STILL:
+        wrong = (lower & (-pull > STILL)) | (upper & (pull > STILL))
+        if not wrong.any():
             break
-        lower[worst] = upper[worst] = False
+        lower, upper = lower & ~wrong, upper & ~wrong
     return x, ActiveSet(lower, upper, program.elastic @ x < program.least), used
 
 
-def _longest(program: QuadraticProgram, x: Array, way: Array, held: Mask) -> tuple[float, int]:
+def _longest(program: QuadraticProgram, x: Array, way: Array) -> tuple[float, int]:
     """How far one may go before a bound, in units of the way (inf without one), and which bound that is."""
     room = np.where(way > 0.0, program.upper - x, program.lower - x)
-    moving = ~held & (np.abs(way) > STILL)
+    moving = np.abs(way) > STILL
     share = np.where(moving, room / np.where(moving, way, 1.0), np.inf)
     nearest = int(np.argmin(share))
     return (float(share[nearest]), nearest) if np.isfinite(share[nearest]) else (np.inf, -1)

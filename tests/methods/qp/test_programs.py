@@ -93,7 +93,7 @@ def test_the_active_set_of_an_answer_leads_to_it(random_program):
         assert again.x == pytest.approx(answer.x, abs=1e-11)
 
 
-def test_programs_of_a_run_often_need_no_solver(random_program):
+def test_programs_of_a_run_need_no_solver(random_program):
     rng = np.random.default_rng(12)
     closed, working_set = [], WorkingSet(make_solver("osqp"))
     for _ in range(40):
@@ -103,7 +103,7 @@ def test_programs_of_a_run_often_need_no_solver(random_program):
         answer = working_set.solve(program, np.arange(len(program.least)))
         assert answer.x == pytest.approx(by_quadprog(program), abs=1e-7)
         closed.append(answer.by)
-    assert closed.count("active set") >= 8  # these are far harder than those of postures
+    assert set(closed) <= {"active set", "semismooth newton"}
 
 
 def test_active_set_method_needs_only_a_guess_that_is_near(random_program):

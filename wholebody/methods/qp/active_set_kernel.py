@@ -178,35 +178,45 @@ def minimise(
         stack_elastic(program, pushes, own)
         if not minimise_on_face(program, active, own, m + len(pushes), tolerance, end):
             return used
-        longest, hit, largest = np.inf, -1, 0.0
         for i in range(n):
             way[i] = 0.0 if at_lower[i] or at_upper[i] else end[i] - x[i]
+        if _walk(program, active, x, way, violated, speed):
+            continue
+        # the minimum of the face: let the bounds go that hold on the wrong side
+        _differentiate(program, violated, x, gradient)
+        right = True
+        for i in range(n):
+            pull = gradient[i] / diagonal[i]
+            if (at_lower[i] and -pull > STILL) or (at_upper[i] and pull > STILL):
+                at_lower[i] = at_upper[i] = right = False
+        if right:
+            return used
+    return iterations
+
+
+@compiled(inner=True, error_model="numpy")
+def _walk(program: QuadraticProgram, active: ActiveSet, x: Array, way: Array, violated: Array, speed: Array) -> bool:
+    """Go along a way (n,) as far as the objective decreases, which bends at bounds; whether a face is left to look at.
+
+    A bound that is met holds from then on, and the others go on: one face may meet many.
+    """
+    lower, upper, met = program.lower, program.upper, False
+    while True:
+        longest, hit, largest = np.inf, -1, 0.0
+        for i in range(len(x)):
             largest = max(largest, abs(way[i]))
             if abs(way[i]) > STILL:
                 room = ((upper[i] if way[i] > 0.0 else lower[i]) - x[i]) / way[i]
                 if room < longest:
                     longest, hit = room, i
         best = _line_minimum(program, x, way, violated, speed, longest)
-        for i in range(n):
+        for i in range(len(x)):
             x[i] = min(max(x[i] + best * way[i], lower[i]), upper[i])
         changed = _look(program, x, violated, active)
-        if best == longest and hit >= 0:  # a bound is in the way: it holds from now on
-            at_lower[hit], at_upper[hit] = way[hit] < 0.0, way[hit] > 0.0
-            continue
-        if best * largest > STILL and not (best == 1.0 and not changed):
-            continue
-        # the minimum of the face: let the bound go that holds the most
-        _differentiate(program, violated, x, gradient)
-        worst, place = STILL, -1
-        for i in range(n):
-            pull = gradient[i] / diagonal[i]
-            wrong = -pull if at_lower[i] else (pull if at_upper[i] else 0.0)
-            if wrong > worst:
-                worst, place = wrong, i
-        if place < 0:
-            return used
-        at_lower[place] = at_upper[place] = False
-    return iterations
+        if best != longest or hit < 0:
+            return met or (best * largest > STILL and (best != 1.0 or changed))
+        active.lower[hit], active.upper[hit] = way[hit] < 0.0, way[hit] > 0.0
+        way[hit], met = 0.0, True
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)

@@ -38,9 +38,9 @@ class QP(Settings, Descends):
     Attributes:
         solver: "osqp", "active_set" (our own), "daqp" or any name that qpsolvers lists on this machine; see `wholebody
             doctor`.
-        hot_start: whether programs begin with the active set of the one before, corrected, and the solver is asked only
-            where that does not settle. Otherwise every program is the solver's. The answers are the same to rounding;
-            `Solution.programs` says how many programs each closed.
+        hot_start: whether programs begin with the active set of the one before, corrected, then semismooth Newton
+            steps, and the solver is asked only where these fail. Otherwise every program is the solver's. The answers
+            are the same to rounding; `Solution.programs` says how many programs each closed.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent; one that ends there while the measures decrease goes on, within the
             budget.
@@ -81,7 +81,7 @@ class QP(Settings, Descends):
     def name(self) -> str:
         """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program.
 
-        "qp/active_set" and "+hot_start" begin with the last active set, and ask their solver where it does not settle.
+        "qp/active_set" and "+hot_start" begin with the last active set, and ask their solver where nothing else ends.
         """
         if self.hot_start:
             return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")

@@ -21,17 +21,14 @@ from wholebody.methods.qp.settings import CORRECTIONS
 ACTIVE_SET = "active set"
 """What `QPSolution.by` says of answers that the hot start found: an active set that was known, corrected."""
 
-LARGEST = 400
-"""Rows of a program above which a hot start that does not settle asks no solver: setting one up takes longer."""
-
 
 class QPSolver(ABC):
     """Solves the programs of one run, one after the other; keeps what helps the next one, and counts what closed them.
 
     Attributes:
         name: of the solver.
-        hot_start: whether programs begin with the active set of the one before, corrected; the solver is then asked
-            only where that does not settle. Otherwise every program is the solver's.
+        hot_start: whether programs begin with the active set of the one before, corrected, then semismooth Newton
+            steps; the solver is asked only where these fail. Otherwise every program is the solver's.
         uncorrected: (n,) the solver's own answer to the last program that it was given, before the active set was
             corrected; None where it has none.
     """
@@ -48,9 +45,8 @@ class QPSolver(ABC):
         if not program.is_computable:
             stay = np.clip(np.zeros(program.size), program.lower, program.upper)
             return QPSolution(np.where(np.isfinite(stay), stay, 0.0), violated_set(program), False, 0, NOT_EXACT)
-        if self.hot_start and len(program.target) + len(program.least) > LARGEST:
-            return last_resort(program, np.zeros(program.size), 0)
-        return self.solve_cold(program)
+        answer = last_resort(program, np.zeros(program.size), 0) if self.hot_start else None
+        return answer if answer is not None and answer.exact else self.solve_cold(program)
 
     def count(self, by: str) -> str:
         """Count one program by what closed it, and return that."""

@@ -20,6 +20,7 @@ from wholebody.methods.qp.solvers.base import ACTIVE_SET, SCALING, QPSolver, rea
 
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 SLOTS = 8  # elastic rows come in multiples of this, so that sizes seldom change; more slots = slower iterations
+PATIENCE = 120  # corrections of a set that nothing is known of, before OSQP is asked
 EXTENSION = "osqp.ext_builtin"
 
 
@@ -44,8 +45,7 @@ class OSQPSolver(QPSolver):
         """Minimise; see `QPSolver.solve_cold`."""
         workspace = self.workspace(program)
         iterations = 0
-        # of them with a hot start: more take several times as long as semismooth Newton steps
-        for limit in ROUNDS[:2] if self.hot_start else ROUNDS:
+        for limit in ROUNDS:
             iterations += workspace.run(limit)
             near = self.uncorrected = workspace.x()
             solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
@@ -68,7 +68,7 @@ class ActiveSetSolver(OSQPSolver):
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
-        solution = solve_from(program, violated_set(program), CORRECTIONS.most)
+        solution = solve_from(program, violated_set(program), PATIENCE)
         return super().solve_cold(program) if solution is None else with_values(solution, by=ACTIVE_SET)
 
 
