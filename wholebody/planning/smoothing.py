@@ -26,18 +26,20 @@ def length(model: pin.Model, path: Sequence[Array]) -> float:
     return float(sum(np.linalg.norm(pin.difference(model, *pair)) for pair in pairwise(path)))
 
 
-def shortcut(model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator) -> list[Array]:
+def shortcut(
+    model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator, partial: bool
+) -> list[Array]:
     """A shorter path: until several tries in a row fail, parts of it are replaced by motions of the local planner.
 
-    In every other try one degree of freedom moves evenly from one end of a part to the other, and the rest as before
-    (partial shortcuts, Geraerts and Overmars 2007).
+    If `partial`, in every other try one degree of freedom, or a limb of a body, moves evenly from one end of a part to
+    the other, and the rest as before (partial shortcuts, Geraerts and Overmars 2007).
     """
     failed = 0
     while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
         part = path[first : last + 1]
         most = WORTH * length(model, part)
-        alone = local.partial and failed % 2
+        alone = partial and failed % 2
         way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
         path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
         failed = 0 if way else failed + 1
