@@ -120,8 +120,8 @@ def test_the_limbs_of_a_body_that_turn_back_on_the_way_move_evenly() -> None:
         q[0] += share
         path.append(q)
     local: Any = NothingButParts()
-    asked = []
-    local.through = lambda part: list(part[1:]) if len(asked) < 40 and not asked.append(part) else []
+    asked = iter(range(40))
+    local.through = lambda part: [] if next(asked, None) is None else list(part[1:])
     found = shortcut(model, path, local, rng, partial=True)
     assert length(model, path) > 10.0
     assert length(model, found) < 1.5
