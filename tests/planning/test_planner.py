@@ -16,7 +16,8 @@ from tests.audits.plan_scenes import hand_into_box
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan
-from wholebody.planning.local_planner import TrackedMotions
+from wholebody.planning.ends import nearer
+from wholebody.planning.local_planner import Geodesics, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, shortcut, tighten
@@ -85,7 +86,7 @@ def test_a_person_reaches_through_a_hole_on_its_feet(least_distance: Distance) -
 class NothingButParts:
     """A local planner by which no two postures are joined, and every path between them is free."""
 
-    searches, tries, partial = 1, 300, True
+    searches, tries = 1, 300
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         return []
@@ -101,11 +102,51 @@ def test_a_joint_that_turns_back_on_the_way_moves_evenly_though_no_two_postures_
     model, share = planar_arm((0.5, 0.5)).model, np.linspace(0.0, 1.0, 41)
     path = list(np.stack([share, 0.5 * np.sin(5.0 * np.pi * share)], axis=1))
     local: Any = NothingButParts()
-    found = shortcut(model, path, local, np.random.default_rng(0))
+    found = shortcut(model, path, local, np.random.default_rng(0), partial=True)
     straight = float(np.linalg.norm(path[-1] - path[0]))
     assert length(model, path) > 3.0 * straight
     assert length(model, found) < 1.1 * straight
     np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
+
+
+def test_the_limbs_of_a_body_that_turn_back_on_the_way_move_evenly() -> None:
+    """A person goes a metre straight on, and all of it waves: to straighten each joint alone takes a try for each."""
+    figure, rng = wb.load("human"), np.random.default_rng(0)
+    model, start, path = figure.model, figure.posture("standing"), []
+    waving = rng.uniform(0.1, 0.3, model.nv)
+    for share in np.linspace(0.0, 1.0, 41):
+        away = np.sin(5.0 * np.pi * share) * np.sin(np.pi * share) * waving
+        q = np.asarray(pin.integrate(model, start, away))
+        q[0] += share
+        path.append(q)
+    local: Any = NothingButParts()
+    asked = iter(range(40))
+    local.through = lambda part: [] if next(asked, None) is None else list(part[1:])
+    found = shortcut(model, path, local, rng, partial=True)
+    assert length(model, path) > 10.0
+    assert length(model, found) < 1.5
+    np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
+
+
+def test_a_path_to_a_goal_ends_where_this_is_met_near_to_it(planar_arm: Callable[..., wb.Figure]) -> None:
+    """Three hinges meet a point in many postures; a path to a far one need not be gone to its end."""
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3), limit=3.0))
+    tip, start = scene.figure.segments[-1], np.array((0.2, 0.3, 0.2))
+    far = np.array((1.5, -1.2, -1.0))
+    offset = (0.3, 0.0, 0.0)
+    at = scene.figure.placement(far, tip).act(np.array(offset))
+    problem = wb.Problem(scene, start, goals=[wb.Point(tip, at, offset=offset)])
+    with problem.borrow() as workspace:
+        found = nearer(
+            problem,
+            [start, 0.5 * far + 0.5 * start, far],
+            Geodesics(problem, workspace),
+            Sampler(problem, np.random.default_rng(0)),
+        )
+    assert length(scene.model, found) < 0.8 * length(scene.model, [start, far])
+    np.testing.assert_array_equal(found[0], start)
+    end = scene.figure.placement(found[-1], tip).act(np.array(offset))
+    np.testing.assert_allclose(end, at, atol=1e-4)
 
 
 def test_a_path_round_a_ball_is_drawn_tight(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:

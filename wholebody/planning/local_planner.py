@@ -65,13 +65,12 @@ class Geodesics:
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
-        self.partial = not problem.scene.figure.roots  # motions of free bodies became no shorter, but later
+        self.partial = True
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
         # of every pair by every freedom
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
-        self._between = (self._approach > 0.0).astype(float)
         state, terms = workspace.state.update(problem.start), problem.constraints
         self._values = ConstraintValues(terms, state)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
@@ -83,6 +82,14 @@ class Geodesics:
                 f"plan: how much a motion brings {names[0]} and {names[1]} together has no bound; attach a box in "
                 "place of a half-space, and give limits to what slides"
             )
+        # a radius that is larger by a metre makes way as what turns does
+        wider = np.asarray(largest_approach(workspace.table, centres + 1.0, np.eye(self._model.nv)))
+        self._turning = np.where(wider - self._approach > 1e-9, wider - self._approach, 0.0)
+        self._bending = np.where(self._turning > 0.0, 1.0, 2.0) * self._approach
+        joints, supports = workspace.table.joint[workspace.table.pairs], [set(s) for s in self._model.supports]
+        carried = [(a in supports[b], b in supports[a]) for a, b in joints.tolist()]
+        # as a piece sees another one that it does not carry, twice as much
+        self._views = np.where(np.array(carried).reshape(-1, 2), 0.25, 0.5)
         levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
         self.shares = levers / levers.max()
 
@@ -162,16 +169,17 @@ class Geodesics:
 
         With c the chord of a pair's motion against each other and A a bound of its acceleration, the least room on the
         way is half of what both ends have together less c, and less A / 8. By all freedoms between the two, that turn
-        by w and move a point by v, A <= 2 sum(w) sum(v); sum(v) bounds the chord too.
+        by w and move a point by v, A <= sum(w) sum(v) where one piece carries the other and sees it, else twice that;
+        what slides counts twice. sum(v) bounds the chord too.
         """
         if seen is None or ahead is None:
             return False
-        most = np.abs(motion)
-        way = self._approach @ most
-        asked = [(q, motion, seen, ahead, way, 0.5 * way * (self._between @ most))]
+        most, least = np.abs(motion), self._required - MARGIN
+        bent = self._views * ((self._turning @ most) * (self._bending @ most))[:, None]
+        asked = [(q, motion, seen, ahead, self._approach @ most, bent)]
         for here, whole, first, last, far, bent in asked:  # grows while it is read
             room = first.room + last.room + 2.0 * MARGIN
-            if kept_apart(self._workspace.table, first.placed, last.placed, (room, far, bent)):
+            if kept_apart(self._workspace.table, first.placed, last.placed, (room, far, bent, least)):
                 continue
             half = 0.5 * whole
             middle = np.asarray(pin.integrate(self._model, here, half))

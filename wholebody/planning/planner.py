@@ -21,11 +21,10 @@ from wholebody.base.compiled import compile_all, compile_seconds
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
-from wholebody.methods.conclusion import meets
 from wholebody.methods.control import BUDGET, within_budget
-from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
+from wholebody.planning.ends import End, answers, nearer
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect
 from wholebody.planning.sampling import Sampler, holds
@@ -38,9 +37,10 @@ from wholebody.tasks.base import Bound, Constraint, Goal
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
-ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
 AGAIN = 0.35  # of the time limit: for shorter paths; more = shorter, later
+POLISHED = 0.55  # of the time limit: the shortest path is drawn tight again until then
+TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
     "wholebody.methods.qp.active_set",
@@ -52,9 +52,6 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
 )
-_End = tuple[Array | None, str]
-"""A posture (nq,) at which a motion may end, None where goals were not met; and why."""
-
 LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
@@ -140,7 +137,7 @@ def plan(
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         _check_end(problem, problem.start, "start")
         sampler = Sampler(problem, rng)
-        ends = _answers(problem, sampler) if goals else iter([(_posture(problem, goal), "")])
+        ends = answers(problem, sampler) if goals else iter([(_posture(problem, goal), "")])
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
@@ -199,24 +196,6 @@ def _moved(problem: Problem, q: Array) -> float:
     return float(np.max([np.abs(pin.difference(model, problem.start, each)[still]).max() for each in q]))
 
 
-def _answers(problem: Problem, sampler: Sampler) -> Iterator[_End]:
-    """Ends that meet the goals: that of the least measures, then those near random postures; or why there is none."""
-    bare = problem.with_start(problem.start)
-    bare.measures = ()  # these lead most starts to one end
-    for number in range(ENDS):
-        if number == 0:
-            solution = QP().solve(problem)
-        else:
-            solution = QP(restarts=0, budget=0).solve(bare.with_start(sampler.near(problem.start, number / (ENDS - 1))))
-        # Half of the ends are on any side of whole turns: things can block the nearest.
-        near = problem.start if number < ENDS // 2 else sampler.anywhere()
-        end = sampler.turned(solution.q, near) if solution.solved else None
-        # a goal or a constraint on joint values may be met on one side of a whole turn alone
-        if end is not None and not np.array_equal(end, solution.q) and not meets(assess(problem, end), QP().tolerance):
-            end = solution.q
-        yield end, solution.message
-
-
 class _Search:
     """The search for paths from the start of a problem to its ends."""
 
@@ -224,7 +203,7 @@ class _Search:
         self,
         judge: _Judge,
         planners: tuple[LocalPlanner, TrackedMotions],
-        ends: Iterator[_End],
+        ends: Iterator[End],
         random: tuple[Sampler, np.random.Generator],
     ) -> None:
         self._judge, self._ends, self._begun = judge, ends, False
@@ -234,6 +213,7 @@ class _Search:
         self._reached: list[Array] = []
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
+        self._bodily = free_root and self._local is not self._slides
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
         self._straight = False
@@ -251,14 +231,22 @@ class _Search:
             if self._straight:
                 return path, "the straight motion"
             with self._judge.in_time(path):
-                path = shortcut(model, path, self._local, self._rng)
+                # limbs that move evenly cost as much as five other shortcuts
+                path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
+                path = nearer(self._problem, path, self._local, self._sampler)
             if (found := length(model, path)) < most:
                 best, most = path, found
+                if not any(np.array_equal(path[-1], q) for q in self._reached):
+                    self._reached.append(path[-1])
         if best is not None:
-            if self._local is not self._slides:
+            before = np.inf
+            while self._local is not self._slides and most < TIGHT * before and BUDGET.spent < POLISHED:
                 # most of what is left is for smoothing
                 with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
+                    if self._bodily:
+                        best = shortcut(model, best, self._local, self._rng, True)
                     best = tighten(model, best, self._local, self._slides)
+                before, most = most, length(model, best)
             return best, f"the shortest of {runs} searches"
         if not self._reached:
             late = "" if BUDGET.spent < SEARCHED else " was found in time that"

@@ -26,18 +26,20 @@ def length(model: pin.Model, path: Sequence[Array]) -> float:
     return float(sum(np.linalg.norm(pin.difference(model, *pair)) for pair in pairwise(path)))
 
 
-def shortcut(model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator) -> list[Array]:
+def shortcut(
+    model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator, partial: bool
+) -> list[Array]:
     """A shorter path: until several tries in a row fail, parts of it are replaced by motions of the local planner.
 
-    In every other try one degree of freedom moves evenly from one end of a part to the other, and the rest as before
-    (partial shortcuts, Geraerts and Overmars 2007).
+    If `partial`, in every other try one degree of freedom, or a limb of a body, moves evenly from one end of a part to
+    the other, and the rest as before (partial shortcuts, Geraerts and Overmars 2007).
     """
     failed = 0
     while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
         part = path[first : last + 1]
         most = WORTH * length(model, part)
-        alone = local.partial and failed % 2
+        alone = partial and failed % 2
         way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
         path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
         failed = 0 if way else failed + 1
@@ -45,16 +47,32 @@ def shortcut(model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.r
 
 
 def _evened(model: pin.Model, part: list[Array], local: LocalPlanner, rng: np.random.Generator) -> list[Array]:
-    """A part of a path in which a degree of freedom that turns back moves evenly, without its first posture."""
+    """A part of a path in which freedoms that turn back move evenly, without its first posture."""
     away = places(model, part)
     wasted = np.abs(np.diff(away, axis=0)).sum(axis=0) - np.abs(away[-1])
     if len(part) < 3 or wasted.max() < LEAST:
         return []
     freedom = int(rng.choice(len(wasted), p=np.maximum(wasted, 0.0) / np.maximum(wasted, 0.0).sum()))
     steps = np.linalg.norm(np.diff(away, axis=0), axis=1)
-    away[1:, freedom] = away[-1, freedom] * np.cumsum(steps) / steps.sum()
+    evened = _together(model, freedom, rng)
+    away[1:, evened] = np.cumsum(steps)[:, None] / steps.sum() * away[-1, evened]
     even = _postures(model, part, away)
     return local.through(even) if length(model, list(even)) < length(model, part) - LEAST else []
+
+
+def _together(model: pin.Model, freedom: int, rng: np.random.Generator) -> list[int]:
+    """The freedoms that move evenly with one: it alone on a fixed base; of a body its root's, or those of a limb."""
+    roots = [joint.nv for joint in model.joints if joint.nv == 6]
+    if not roots:
+        return [freedom]
+    number = next(k for k, joint in enumerate(model.joints) if joint.idx_v <= freedom < joint.idx_v + joint.nv)
+    if model.joints[number].nv == 6:
+        chosen = [number]
+    else:
+        above = [int(j) for j in model.supports[number]][1:]
+        top = above[rng.integers(len(above))]
+        chosen = [int(j) for j in model.subtrees[top] if model.joints[int(j)].nv < 6]
+    return [model.joints[j].idx_v + k for j in chosen for k in range(model.joints[j].nv)]
 
 
 def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: TrackedMotions) -> list[Array]:

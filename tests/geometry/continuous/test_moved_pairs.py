@@ -93,8 +93,30 @@ def test_pairs_are_kept_apart_by_the_chord_of_what_one_sees_of_the_other(free_bo
     after[:, 3] += shift
     after[1, :3] = pin.exp3(angle * np.array((0.0, 0.0, 1.0))).T
     chord = 2.0 * np.sin(0.5 * angle) * 0.5 * np.linalg.norm((0.3, 0.4, 0.5))
-    endless, none = np.array([9.0]), np.zeros(1)
-    assert kept_apart(table, before, after, (np.array([1.001 * chord]), endless, none))
-    assert not kept_apart(table, before, after, (np.array([0.999 * chord]), endless, none))
-    assert not kept_apart(table, before, after, (np.array([1.001 * chord]), endless, np.array([0.01 * chord])))
-    assert kept_apart(table, before, after, (np.array([0.5 * chord]), np.array([0.4 * chord]), endless))
+    endless, none, apart = np.array([9.0]), np.zeros((1, 2)), np.array([2.0])  # no face has the other one so far away
+    assert kept_apart(table, before, after, (np.array([1.001 * chord]), endless, none, apart))
+    assert not kept_apart(table, before, after, (np.array([0.999 * chord]), endless, none, apart))
+    assert not kept_apart(table, before, after, (np.array([1.001 * chord]), endless, none + 0.01 * chord, apart))
+    assert kept_apart(table, before, after, (np.array([0.5 * chord]), np.array([0.4 * chord]), none + 9.0, apart))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_pairs_are_kept_apart_by_a_face_that_one_moves_along(free_bodies, turned):
+    """A capsule goes a metre along the top of a box, 0.02 m above it; one that is turned is lower at one end."""
+    first, second = wb.Box((2.0, 2.0, 0.2)), wb.Capsule(0.03, 0.4)
+    angle = 0.04 * turned
+    for bodies in ((first, second), (second, first)):
+        table = wb.Scene(free_bodies(*bodies)).built.table
+        capsule = bodies.index(second)
+        before = np.tile(np.eye(4)[:, :3], (2, 1, 1))
+        before[:, :3] = pin.utils.rotate("y", 0.3).T
+        before[capsule, :3] = pin.utils.rotate("y", 0.3 + 0.5 * np.pi).T  # it lies
+        after = before.copy()
+        after[capsule, :3] = pin.utils.rotate("y", 0.3 + 0.5 * np.pi + angle).T
+        before[capsule, 3] = np.array((-0.5, 0.1, 0.15)) @ before[1 - capsule, :3]
+        after[capsule, 3] = np.array((0.5, 0.1, 0.15)) @ after[1 - capsule, :3]
+        left, far = 0.02 - 0.2 * np.sin(angle), np.ones(1)
+        for bent in (0.0, 0.01):
+            twice = np.full((1, 2), 2.0 * bent)
+            for least, kept in ((left - bent - 1e-6, True), (left - bent + 1e-6, False)):
+                assert kept_apart(table, before, after, (0.1 * far, far, twice, least * far)) == kept
