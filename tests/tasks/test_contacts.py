@@ -233,9 +233,11 @@ def test_a_thing_that_is_moved_is_touched_where_it_is(scene: wb.Scene) -> None:
     own = copy.deepcopy(scene)
     q = own.figure.posture("standing")
     touch = wb.Touch("right_index_tip", "ball").resolve(own, q)
-    before = touch.value(own.state(q))[0]
+    state = own.state(q)  # whose posture stays
+    before = touch.value(state)[0]
     own.move("ball", at=np.array((0.1, -0.9, 1.3)) + (0.0, -1.0, 0.0))
-    assert touch.value(own.state(q))[0] > before + 0.5
+    assert touch.value(state)[0] > before + 0.5
+    assert touch.value(state)[0] == touch.value(State(own.model).update(q))[0]
     assert pickle.loads(pickle.dumps(touch)).value(own.state(q))[0] == pytest.approx(touch.value(own.state(q))[0])
 
 

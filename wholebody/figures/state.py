@@ -50,6 +50,8 @@ class State:
         support: (njoints, n) 1 where a column moves a joint, else 0.
         column_joint: (n,) the joint that a column belongs to.
         parents: (njoints,) the joint that carries each joint.
+        number: how many postures it was moved to.
+        kept: what is worth keeping by whoever computed it, who says by `number` of which posture it is.
     """
 
     def __init__(self, model: pin.Model) -> None:
@@ -71,6 +73,7 @@ class State:
         self._centers: dict[range | None, Array] = {}
         self._spare: pin.Data | None = None
         self._companions: dict[object, State] = {}
+        self.number, self.kept = 0, dict[object, Any]()
         self._asked = b""
         self.update(self.q)
 
@@ -97,6 +100,7 @@ class State:
             self._take_jacobian()
         self._frames.clear()
         self._centers.clear()
+        self.number += 1
         return self
 
     def at(self, q: Array) -> State:

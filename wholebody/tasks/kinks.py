@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
-from wholebody.geometry.pieces import SweptPoints
 from wholebody.tasks.axis import across
 from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, between_pieces, outermost
 
@@ -45,18 +45,19 @@ def faces_met(
     points = np.vstack([_behind(first, i, ours, normals[: len(faces)]), edges[:, 1]])
     values = np.einsum("ij,ij->i", normals, points) - offsets
     # most faces of a piece that are looked at, those first that are nearest or passed
-    keys, found = np.argsort(-values)[:8], []
-    places = [second.placed(other, state) for other in range(len(second.shapes))]
-    apart = np.array([place.translation for place in places]) - points[keys, None]
+    keys, where = np.argsort(-values)[:8], second.where(state)
+    apart = where.origins - points[keys, None]
     # m: pieces of one thing that are farther away do not continue its surface
     near = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) < np.add(second.reach, 0.05)
     near[:, j] = False
-    for key, others in zip(keys.tolist(), near, strict=True):
-        plane = FacePlane(float(values[key]), normals[key], points[key], key)
-        beside = [(second.shapes[k], places[k], second.swept[k]) for k in np.flatnonzero(others)]
-        if not any(_goes_on(*piece, plane, (first.shapes[i], ours)) for piece in beside):
-            found.append(plane)
-    return found
+    others = np.flatnonzero(near.any(axis=0)).tolist()
+    beyond = near[:, others] & (_heights(second, others, where.places, normals[keys]) > offsets[keys, None] + ACCURACY)
+    for n, other in enumerate(others):  # it continues the surface if it is also where the first piece touches
+        if beyond[:, n].any():
+            met = between_pieces(first.shapes[i], ours, second.shapes[other], where.places[other])
+            beyond[:, n] &= met.min_distance <= STEP
+    ends = keys[~beyond.any(axis=1)].tolist()
+    return [FacePlane(float(values[key]), normals[key], points[key], key) for key in ends]
 
 
 def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
@@ -115,10 +116,16 @@ def _behind(surface: Surface, number: int, placement: pin.SE3, normals: Array) -
     return np.asarray(placed[np.argmin(normals @ placed.T, axis=1)] - swept.radius * normals)
 
 
-def _goes_on(own: Any, place: pin.SE3, swept: SweptPoints, plane: FacePlane, met: tuple[Any, pin.SE3]) -> bool:
-    """Whether a piece reaches beyond a plane, and a shape at its placement touches it."""
-    offset = float(plane.normal @ plane.point) - plane.value
-    beyond = not np.isfinite(swept.reach) or (
-        float((outermost(own, place, plane.normal, swept) @ plane.normal).max()) > offset + ACCURACY
-    )
-    return beyond and between_pieces(*met, own, place).min_distance <= STEP
+def _heights(surface: Surface, pieces: Sequence[int], places: Sequence[pin.SE3], ways: Array) -> Array:
+    """How far pieces (n,) reach along directions (m, 3) from the world's origin, (m, n) [m]."""
+    found = np.empty((len(ways), len(pieces)))
+    for n, k in enumerate(pieces):
+        swept, place = surface.swept[k], places[k]
+        along = ways @ place.rotation
+        if not np.isfinite(swept.reach):
+            found[:, n] = np.inf
+        elif len(swept.points):
+            found[:, n] = (along @ swept.points.T).max(axis=1) + swept.radius + ways @ place.translation
+        else:  # an ellipsoid
+            found[:, n] = np.linalg.norm(along * swept.half, axis=1) + ways @ place.translation
+    return found

@@ -6,7 +6,7 @@ are asked for, so a thing that is moved after a term was resolved is found where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import coal
@@ -27,8 +27,20 @@ _T = TypeVar("_T")
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
+STANDING = -1  # the number of what no posture moves
+MOST_KEPT = 256  # surfaces and pairs of which a state keeps where they are: hundreds of problems may share one
 _REQUEST = coal.DistanceRequest()
 _REQUEST.gjk_tolerance = _REQUEST.epa_tolerance = ACCURACY
+
+
+class Where(NamedTuple):
+    """Where the pieces of a surface are."""
+
+    number: int  # that of the posture; `STANDING` where no joint moves them
+    first: pin.SE3  # placement of the first piece in its joint: a thing may be moved at any time
+    places: list[pin.SE3]  # (k,) in the world
+    origins: Array  # (k, 3) [m]
+    shapes: tuple[Any, ...]  # those of the surface, whose identity names it
 
 
 class Surface(NamedTuple):
@@ -53,8 +65,24 @@ class Surface(NamedTuple):
 
     def placed(self, number: int, state: State) -> Any:
         """Placement (pin.SE3) of a piece in the world."""
-        local = self.fixed if self.fixed is not None else self.geometry.geometryObjects[self.pieces[number]].placement
-        return state.data.oMi[self.joints[number]] * local
+        return self.where(state).places[number]
+
+    def where(self, state: State) -> Where:
+        """Where the pieces are: of a thing that stands still, from the posture before."""
+        key, first = id(self.shapes), self._local(0)
+        kept: Where | None = state.kept.get(key)
+        if kept is not None and kept.number in (state.number, STANDING) and kept.first == first:
+            return kept
+        if len(state.kept) > MOST_KEPT:
+            state.kept.clear()
+        places = [state.data.oMi[joint] * self._local(number) for number, joint in enumerate(self.joints)]
+        number = state.number if any(self.joints) else STANDING
+        origins = np.array([place.translation for place in places])
+        found = state.kept[key] = Where(number, pin.SE3(first), places, origins, self.shapes)
+        return found
+
+    def _local(self, number: int) -> Any:
+        return self.fixed if self.fixed is not None else self.geometry.geometryObjects[self.pieces[number]].placement
 
 
 class Nearest(NamedTuple):
@@ -148,10 +176,18 @@ def _made(name: str, owners: tuple[str, ...], geometry: pin.GeometryModel, indic
 
 def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     """The nearest points of two surfaces, by coal; of several pairs of pieces, those of the nearest pair."""
-    ours = [first.placed(k, state) for k in range(len(first.shapes))]
-    theirs = [second.placed(k, state) for k in range(len(second.shapes))]
+    key, one, other = (id(first.shapes), id(second.shapes)), first.where(state), second.where(state)
+    kept = state.kept.get(key)
+    if kept is None or kept[0] is not one or kept[1] is not other:
+        kept = state.kept[key] = one, other, _nearest(first, second, one, other)
+    found: Nearest = kept[2]
+    return found
+
+
+def _nearest(first: Surface, second: Surface, one: Where, other: Where) -> Nearest:
+    ours, theirs = one.places, other.places
     best: tuple[float, Any, int, int] | None = None
-    for least, i, j in _pairs(first, ours, second, theirs):
+    for least, i, j in _pairs(first, one.origins, second, other.origins):
         if best is not None and least > best[0]:
             break
         result = between_pieces(first.shapes[i], ours[i], second.shapes[j], theirs[j])
@@ -168,15 +204,13 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
 
 
-def _pairs(
-    first: Surface, ours: Sequence[pin.SE3], second: Surface, theirs: Sequence[pin.SE3]
-) -> list[tuple[float, int, int]]:
-    """Pairs of pieces after a lower bound of their distance, the least first."""
+def _pairs(first: Surface, ours: Array, second: Surface, theirs: Array) -> Iterator[tuple[float, int, int]]:
+    """Pairs of pieces with origins (k, 3) after a lower bound of their distance, the least first."""
     if len(ours) == len(theirs) == 1:
-        return [(-np.inf, 0, 0)]
-    apart = np.array([place.translation for place in ours])[:, None] - [place.translation for place in theirs]
+        return iter([(-np.inf, 0, 0)])
+    apart = ours[:, None] - theirs
     least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
-    return sorted((bound, i, j) for i, row in enumerate(least.tolist()) for j, bound in enumerate(row))
+    return ((float(least.flat[k]), *divmod(int(k), len(theirs))) for k in np.argsort(least, axis=None, kind="stable"))
 
 
 def between_pieces(first: Any, placed: pin.SE3, second: Any, other: pin.SE3) -> Any:

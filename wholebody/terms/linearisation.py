@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.figures.description import Limits
@@ -192,15 +192,23 @@ class Lineariser:
                 squares = np.vstack([squares, sqrt(2.0 * weight) * slopes])
                 squared = squared + weight * curvature
         goals = self._plan.goal_rows
-        terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
-        found = term_planes(terms, self._plan.rows, self.state) if planes and self._plan.others else None
         gap, contact, clearance = (part[:count].copy() for part in self._gaps)
         contacts = Contacts(*[part.copy() for part in contacts])
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts, gap,
             jacobian[rows:], contact, clearance, float(measure[0, nv]), measure[0, :nv], measure[1, :nv], box[0],
-            box[1], squares, squared, found,
+            box[1], squares, squared, self._planes() if planes else None,
         )  # fmt: skip
+
+    def with_planes(self, at: Linearisation) -> Linearisation:
+        """A linearisation that was made without planes, with them."""
+        if self._plan.others and not np.array_equal(self.state.q, at.q):
+            self.state.update(at.q)
+        return with_values(at, planes=self._planes())
+
+    def _planes(self) -> TermPlanes | None:
+        terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
+        return term_planes(terms, self._plan.rows, self.state) if self._plan.others else None
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:
         """What `at` returns, in arrays that the next question to the workspace overwrites."""

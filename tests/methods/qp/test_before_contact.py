@@ -25,6 +25,14 @@ def test_contacts_are_met_from_an_end_in_front_of_all_faces() -> None:
     assert solution.solved, solution
 
 
+def test_a_descent_that_spent_its_programs_beside_the_contact_goes_on() -> None:
+    """A woman's hands were 0.05 mm from the wheel after 150 programs, and 900 others went into other starts."""
+    method = wb.methods.QP(measures=False, time_limit=30.0, iterations=3)  # from before contact it takes four
+    solution = wb.solve(problem_set("drivers").make(15, 0).problem, method)
+    assert solution.solved, solution
+    assert sum(entry.note.startswith("before contact") for entry in solution.trace) <= 40
+
+
 def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     goal = wb.Point("right_index_tip", (0.5, -0.3, 2.6))

@@ -151,6 +151,8 @@ class Multistart(Search):
     def _into_contact(self, start: Array) -> LocalSolution:
         """A descent from before contact; where three end alike, the search ends."""
         local = self._descend(start, full_step=True)
+        if not local.converged and local.violation.total <= SEARCH.on_its_way:
+            local = self._descend(local.q)
         if local.converged and held(local, self.settings.tolerance):
             self._in_contact.append(local.violation.total)
         return local

@@ -169,6 +169,8 @@ class SearchNumbers(NamedTuple):
     coming_near: int = 40  # most programs from there to the nearest posture among things
     inside_probes: int = 5  # seeded starts for goals inside of things, which only look for the nearest posture
     staying: int = 40  # most programs that improve the measures at the nearest posture to goals that are not met
+    # m: violation up to which a descent into contact that spent its programs goes on. Larger: more go on in vain.
+    on_its_way: float = 1e-3
     optimal: float = 1e-2  # rad: first-order optimality of a contact's answer from which on it counts as none
     lower: float = 0.9995  # share of a contact's measures below which those at its place are another minimum
     moved: float = 0.99  # share below which they are looked for again, at the place of that minimum. More: slower.

@@ -51,7 +51,7 @@ class SQP(Stage):
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
-        here = self.look(start)
+        here = self._with_planes(self.look(start))
         self._width = max(DESCENT.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.shared.solver)
@@ -262,12 +262,21 @@ class SQP(Stage):
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
         self._shift = residual if np.abs(residual).max(initial=0.0) < DESCENT.near_met else np.zeros_like(residual)
-        return there
+        return self._with_planes(there)
+
+    def _with_planes(self, there: Iterate) -> Iterate:
+        """A posture that is taken, with the planes of its terms."""
+        if there.at.planes is not None or self.offset is not None:
+            return there
+        at = self.shared.lineariser.with_planes(there.at)
+        return there if at.planes is None else with_values(there, at=at, rows=self.shared.subproblem.rows(at))
 
     def look(self, q: Array, longest: float = np.inf) -> Iterate:
         """See `Stage.look`."""
         seen = min(PROGRAM.error_clamp * self._radius, DESCENT.within_step * longest, DESCENT.most_within)
-        there = self.iterate_at(q, max(DESCENT.least_within, seen), longest, planes=self.offset is None)
+        # Only measures need planes to judge a step: violations do not count them, and one that is rejected has none.
+        planes = self.measures and self.offset is None
+        there = self.iterate_at(q, max(DESCENT.least_within, seen), longest, planes=planes)
         if self.offset is None:
             return there
         there.rows.soft_error[: there.rows.goals] -= self.offset
