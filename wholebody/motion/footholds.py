@@ -19,14 +19,14 @@ NEARBY = 0.8  # m: ground farther away than a step says nothing of the height he
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
 SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
-STAYED = 0.1  # s before and after a frame: what moves within a small place all the while trembles, as markers do
+STAYED, TREMBLES = 0.1, 0.01  # s before and after a frame; m by which a point that rests goes to and fro, as markers do
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
 class RestLimits(NamedTuple):
     """What counts as rest."""
 
-    speed: float = 0.2  # m/s, largest speed; a rest begins where the speed falls below two thirds of it
+    speed: float = 0.15  # m/s, largest speed; a rest begins where the speed falls below two thirds of it
     height: float = 0.05  # m, largest height above the lowest rest nearby
     least: float = 0.1  # s, shortest rest
     slid: float = 0.08  # m: a point that goes on farther while it is slow has made a step, and rests at two places
@@ -46,10 +46,10 @@ def speeds(places: Array, dt: float, span: float = 0.0) -> Array:
 
 
 def _steady(places: Array, dt: float) -> Array:
-    """(n,) speeds of a point (n, 3): by the smaller of its way between two frames and the extent of longer ones."""
+    """(n,) speeds of a point (n, 3) between two frames, or of going through its extent over more where that is less."""
     half, last = max(1, round(STAYED / dt)), len(places) - 1
-    near = np.clip(np.arange(-half, half + 1) + np.arange(len(places))[:, None], 0, last)
-    extent = np.linalg.norm(np.ptp(places[near], axis=1), axis=1)
+    near = np.clip(np.arange(len(places))[:, None] + np.arange(-half, half + 1), 0, last)
+    extent = np.linalg.norm(np.ptp(places[near], axis=1), axis=1) - TREMBLES
     return np.asarray(np.minimum(speeds(places, dt, SPAN), extent / (dt * np.maximum(near[:, -1] - near[:, 0], 1))))
 
 
@@ -60,9 +60,7 @@ class Point(NamedTuple):
     kind: int
 
 
-def resting(
-    places: Array, dt: float, limits: RestLimits, points: Sequence[Point], allowed: Mask | None = None
-) -> Mask:
+def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point], allowed: Mask | None = None) -> Mask:
     """(n, p) when points (n, p, 3) rest, `dt` seconds apart; only where that is `allowed` (n, p)."""
     found = np.zeros(places.shape[:2], dtype=bool)
     may = np.ones_like(found) if allowed is None else allowed
@@ -84,15 +82,15 @@ def resting(
         if accepted[number]:
             continue
         if number in seen:  # the second time around: at the height of what bears beside it
-            rests = bool((near & (away <= limits.height)).any())
+            stays = bool((near & (away <= limits.height)).any())
         else:
             floor = float(base[near].max(initial=-np.inf)) if near.any() else float(base.min())
             # a foot whose toes, or heel, are far from where they would stand with the rest of it is in the air
             hangs = bool((_of_one_foot(points, stands, number) & ~accepted & (away > limits.height)).any())
-            rests = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
-            rests = rests or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
+            stays = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
+            stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
         seen.add(number)
-        if rests:
+        if stays:
             accepted[number] = True
             frames = np.arange(run.first, run.end)
             found[frames[places[frames, k, 2] <= low + limits.height], k] = True
