@@ -190,6 +190,21 @@ def test_a_person_climbs_stairs_that_stand_there(human: wb.Figure) -> None:
     assert slides(clip, stands).mean() < 2e-3
 
 
+def test_heels_over_the_edge_of_a_step_stay_level(human: wb.Figure) -> None:
+    """Ankles are 2 cm behind the edges of steps: heels, asked to be on the ground below, threw the body metres away."""
+    motion, stands = walker(stairs, 2.0)
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    for step in (1, 2, 3):
+        edge = STEP * step - 0.02
+        scene.add(wb.Box((5.0 - edge, 2.0, 0.15 * step)), name=f"step {step}", at=(0.5 * (5.0 + edge), 0, 0.075 * step))
+    clip = wb.retarget(motion, human, scene)
+    for side, mask in stands.items():
+        heel, ball = (places(clip, f"{side}_{point}")[mask, 2] for point in ("heel", "ball"))
+        assert np.abs(heel - ball).max() < 0.02
+    assert slides(clip, stands).mean() < 2e-3
+    assert max(-scene.contacts(q, 0.01).distance.min(initial=0.0) for q in clip.q) < 2e-3
+
+
 def test_arms_that_were_recorded_inside_the_trunk_are_outside(human: wb.Figure) -> None:
     motion, _ = walker(flat, 0.3)
     at = np.array(motion.positions)

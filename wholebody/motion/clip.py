@@ -21,6 +21,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.motion.mirroring import PLACEMENT, mirrored
+from wholebody.motion.resampling import splined
 
 ROOT_SIZE = 7  # values of a free root
 LARGEST = 1e6  # of a value, radians or metres
@@ -180,10 +181,15 @@ class Clip(Shown):
         found: Array = pin.interpolate(self.figure.model, self.q[first], self.q[first + 1], share)
         return found
 
-    def resampled(self, dt: float) -> Clip:
+    def resampled(self, dt: float, *, smooth: bool = False) -> Clip:
         """The clip at another time step, seconds, interpolated on the configuration manifold.
 
         The first frame is the same. The last one is at the last multiple of the new step within the clip.
+
+        Args:
+            dt: seconds from frame to frame.
+            smooth: on a cubic spline through the frames, without jumps of acceleration, which may go up to a few
+                millimetres past them; by default as `at`, which turns at each frame.
 
         Raises:
             InputError: a time step that is not positive, or so short that there were more than a million frames.
@@ -194,7 +200,8 @@ class Clip(Shown):
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
         places = [min(k * dt / self.dt, len(self) - 1.0) for k in range(frames)]
         things = {name: np.array([_placed(track, place) for place in places]) for name, track in self.things.items()}
-        return Clip(self.figure, np.array([self._between(place) for place in places]), dt, self.name, things)
+        q = splined(self.figure, self.q, np.array(places)) if smooth else [self._between(place) for place in places]
+        return Clip(self.figure, np.array(q), dt, self.name, things)
 
     def mirrored(self) -> Clip:
         """The clip with left and right exchanged, mirrored at the plane y = 0 of the world.

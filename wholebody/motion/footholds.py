@@ -19,6 +19,7 @@ NEARBY = 0.8  # m: ground farther away than a step says nothing of the height he
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
 SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
+STAYED, TREMBLES = 0.1, 0.01  # s before and after a frame; m by which a point that rests goes to and fro, as markers do
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -44,11 +45,23 @@ def speeds(places: Array, dt: float, span: float = 0.0) -> Array:
     return np.asarray(np.linalg.norm(places[last] - places[first], axis=-1) / times)
 
 
-def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int], allowed: Mask | None = None) -> Mask:
-    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; points of one kind are equally high on level ground.
+def _steady(places: Array, dt: float) -> Array:
+    """(n,) speeds of a point (n, 3) between two frames, or of going through its extent over more where that is less."""
+    half, last = max(1, round(STAYED / dt)), len(places) - 1
+    near = np.clip(np.arange(len(places))[:, None] + np.arange(-half, half + 1), 0, last)
+    extent = np.linalg.norm(np.ptp(places[near], axis=1), axis=1) - TREMBLES
+    return np.asarray(np.minimum(speeds(places, dt, SPAN), extent / (dt * np.maximum(near[:, -1] - near[:, 0], 1))))
 
-    They rest only where that is `allowed` (n, p).
-    """
+
+class Point(NamedTuple):
+    """Which point of a body rests; points of one kind are equally high on level ground."""
+
+    foot: str
+    kind: int
+
+
+def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point], allowed: Mask | None = None) -> Mask:
+    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; only where that is `allowed` (n, p)."""
     found = np.zeros(places.shape[:2], dtype=bool)
     may = np.ones_like(found) if allowed is None else allowed
     rests = [slow(places[:, k], dt, limits) & may[:, k] for k in range(places.shape[1])]
@@ -56,17 +69,28 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int], 
         return found
     marks = np.stack(rests, axis=1)
     stands = [(k, run, lowest(places[run.first : run.end, k, 2])) for k, mask in enumerate(rests) for run in runs(mask)]
-    kind = np.array(kinds, dtype=int)
-    lows = _level_of_kinds(stands, kind)
-    base = np.array([low - lows[kind[k]] for k, _, low in stands])
     middles = np.array([places[run.first : run.end, k, :2].mean(axis=0) for k, run, _ in stands]).reshape(-1, 2)
-    accepted = np.zeros(len(stands), dtype=bool)
-    for number in np.argsort(base, kind="stable").tolist():
+    lows = np.array([low for *_, low in stands])
+    rise = above_ground([points[k] for k, *_ in stands], [run for _, run, _ in stands], lows)
+    base = lows - [rise[points[k].kind] for k, *_ in stands]
+    accepted, seen = np.zeros(len(stands), dtype=bool), set[int]()
+    beside = np.linalg.norm(middles[:, None] - middles, axis=2) < NEARBY
+    order = np.argsort(base, kind="stable").tolist()
+    for number in [*order, *order]:
         k, run, low = stands[number]
-        near = accepted & (np.linalg.norm(middles - middles[number], axis=1) < NEARBY)
-        floor = float(base[near].max(initial=-np.inf)) if near.any() else float(base.min())
-        lone = not near.any() and not accepted.any()
-        if lone or base[number] <= floor + limits.height or _bears(places[:, k, 2], run, low, dt, found, marks):
+        near, away = accepted & beside[number], np.abs(base - base[number])
+        if accepted[number]:
+            continue
+        if number in seen:  # the second time around: at the height of what bears beside it
+            stays = bool((near & (away <= limits.height)).any())
+        else:
+            floor = float(base[near].max(initial=-np.inf)) if near.any() else float(base.min())
+            # a foot whose toes, or heel, are far from where they would stand with the rest of it is in the air
+            hangs = bool((_of_one_foot(points, stands, number) & ~accepted & (away > limits.height)).any())
+            stays = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
+            stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
+        seen.add(number)
+        if stays:
             accepted[number] = True
             frames = np.arange(run.first, run.end)
             found[frames[places[frames, k, 2] <= low + limits.height], k] = True
@@ -75,7 +99,7 @@ def resting(places: Array, dt: float, limits: RestLimits, kinds: Sequence[int], 
 
 def slow(places: Array, dt: float, limits: RestLimits) -> Mask:
     """(n,) rest frames of a point (n, 3) by speed alone; the fastest frames of a slow motion separate two rests."""
-    speed = speeds(places, dt, SPAN)
+    speed = _steady(places, dt)
     low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
     kept = np.zeros(len(speed), dtype=bool)
     for run in runs(high):
@@ -95,25 +119,49 @@ def lowest(heights: Array) -> float:
     return float(np.percentile(heights, 20.0))
 
 
-def _level_of_kinds(stands: Sequence[tuple[int, Window, float]], kind: Array) -> dict[int, float]:
-    """How high points of each kind are above the ground, by what is lowest of each; metres, to a common constant."""
-    found = {}
-    for each in set(kind.tolist()):
-        lows = [(low, len(run)) for k, run, low in stands if kind[k] == each]
-        if lows:
-            heights = np.repeat([low for low, _ in lows], [count for _, count in lows])
-            found[each] = float(np.percentile(heights, 10.0))
-    return found
+def above_ground(rests: Sequence[Point], times: Sequence[Window], lows: Array) -> dict[int, float]:
+    """How high points of each kind are above level ground, metres, to a common constant.
+
+    Points of one foot that rest at one time tell it; where none do, the lowest of each kind.
+
+    Args:
+        rests: k points that rest.
+        times: the frames of each.
+        lows: (k,) how high they are, metres.
+    """
+    known = dict[int, float]()
+    for kind in sorted({each.kind for each in rests}):
+        mine = [k for k, each in enumerate(rests) if each.kind == kind]
+        known[kind] = float(np.percentile(np.repeat(lows[mine], [len(times[k]) for k in mine]), 10.0))
+        for other, height in known.items():
+            pairs = [(k, j) for k in mine for j, each in enumerate(rests) if each == Point(rests[k].foot, other)]
+            common = [max(0, min(times[k].end, times[j].end) - max(times[k].first, times[j].first)) for k, j in pairs]
+            if other != kind and any(common):
+                known[kind] = height + float(np.median(np.repeat([lows[k] - lows[j] for k, j in pairs], common)))
+                break
+    return known
 
 
-def _bears(heights: Array, run: Window, low: float, dt: float, found: Mask, marks: Mask) -> bool:
-    """Whether a point came down to a rest and goes up from it, or the body has nothing else that may bear it."""
+def _of_one_foot(points: Sequence[Point], stands: Sequence[tuple[int, Window, float]], number: int) -> Mask:
+    """(k,) which of the stands of points are of the same foot at the same time as one of them."""
+    own, run, _ = stands[number]
+    return np.array([
+        points[k].foot == points[own].foot and max(run.first, other.first) < min(run.end, other.end)
+        for k, other, _ in stands
+    ])  # fmt: skip
+
+
+def _came_down(heights: Array, run: Window, low: float, dt: float) -> bool:
+    """Whether a point of heights (n,) came down to a rest and goes up from it."""
     far = max(1, round(BEFORE / dt))
     before, after = heights[max(0, run.first - far) : run.first], heights[run.end : run.end + far]
-    if len(before) + len(after) and all(
+    return bool(len(before) + len(after)) and all(
         not len(part) or float(part.max()) > low + CAME_DOWN for part in (before, after)
-    ):
-        return True
+    )
+
+
+def _bears(run: Window, dt: float, found: Mask, marks: Mask) -> bool:
+    """Whether the body has nothing else than one point that may bear it during a rest of that."""
     alone = ~(found[run.first : run.end].any(axis=1)) & (marks[run.first : run.end].sum(axis=1) <= 1)
     return bool(alone.sum() * dt > WAITED)
 

@@ -27,6 +27,7 @@ NEARING, SWING = 30.0, 0.3  # weights of what nearly rests, and of a sole betwee
 TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
+EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyond an edge
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -349,7 +350,7 @@ class Holds:
         place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.8 * shift
         point = self.points[number]
         if point.edge:
-            place[2] = self._height(place, stand)
+            place[2] = self._height(number, place, stand, paths, frames)
         elif point.foot:
             for other, end in enumerate(self.points):
                 rests = [each for each in self._stands[other] if isinstance(each, Foothold)]
@@ -365,12 +366,21 @@ class Holds:
                     rise = self._scale * (stand.height - before[-1].height)
                     flat = np.sqrt(max(length**2 - rise**2, 0.0)) / max(float(np.linalg.norm(along[:2])), 1e-9)
                     place = np.array([*(pivot[:2] + flat * along[:2]), 0.0])
-            place[2] = point.above + self._height(place, stand)
+            place[2] = point.above + self._height(number, place, stand, paths, frames)
         self._places[number, stand.first] = place
         return place
 
-    def _height(self, place: Array, stand: Foothold) -> float:
-        """Height at which a point of a sole comes down, metres."""
+    def _height(self, number: int, place: Array, stand: Foothold, paths: Mapping[int, Array], frames: range) -> float:
+        """Height at which a point (3,) of a sole comes down, metres: of one beyond an edge, that of the sole on it."""
         level = self._scale * stand.height
-        below = None if self._surface is None else self._surface(np.array([place[0], place[1], level + STEP]))
-        return CLEARANCE + (level if below is None else below)
+        if self._surface is None:
+            return CLEARANCE + level
+        sole = next(own for own in self._soles if number in own)
+        free = np.mean([paths[frame][sole] for frame in frames], axis=0)
+        beside = place[:2] + free[:, :2] - free[sole.index(number), :2]
+        found = [self._surface(np.array([*at, level + STEP])) for at in (place[:2], *beside)]
+        known = [below for below in found if below is not None]
+        if not known:
+            return CLEARANCE + level
+        own = known[0] if found[0] is not None else -np.inf
+        return CLEARANCE + (own if own > max(known) - EDGE else max(known))

@@ -31,7 +31,9 @@ from wholebody.terms.residual_kernel import cones as cone_angles
 STEP = 0.6  # rad: largest change of a joint in one step; beyond it the linearisation says little
 CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
 DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
-WITHIN, CLEARANCE = 0.01, 5e-4  # m: nearer pairs have rows; distance that they keep
+WITHIN, FARTHER = 0.01, 0.2  # m: nearer pairs have rows; the same of steps that go far
+CLEARANCE = 5e-4  # m: distance that pairs keep
+FAR, SHORTER = 0.5, 0.3  # rad, m: change of a value by a step that is looked at; share of it that the next try may take
 PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
 SOFT = 8  # daqp's flag of a row that may be broken at a price
@@ -165,10 +167,14 @@ class Fitter:
         among: bool = True,
         most: Array | None = None,
         midway: Sequence[Midway] = (),
+        within: float = WITHIN,
     ) -> Array:
-        """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`."""
+        """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`.
+
+        Pairs `within` metres have rows.
+        """
         self._state.update(q)
-        near = self._workspace.proximity.query(self._state.data, WITHIN) if among else None
+        near = self._workspace.proximity.query(self._state.data, within) if among else None
         places = self._places()
         rows, errors = self._rows(places, goals), self._errors(places, goals)
         posture = np.asarray(pin.difference(self.model, goals.posture, q))
@@ -213,6 +219,26 @@ class Fitter:
         if flag <= 0:
             return q
         return self.figure.clamp(np.asarray(pin.integrate(self.model, q, np.asarray(x))))
+
+    def careful_step(self, q: Array, goals: Goals, most: Array | None, midway: Sequence[Midway] = ()) -> Array:
+        """The posture (nq,) after a step; where it goes far and errors and overlaps grow, after a shorter one, or q."""
+        found = self.step(q, goals, most=most, midway=midway)
+        far = float(np.abs(pin.difference(self.model, q, found)).max())
+        if far <= FAR:
+            return found
+        before, bounds = self._merit(q, goals), (-np.inf, np.inf) if most is None else most
+        for _ in range(4):
+            if self._merit(found, goals) <= before:
+                return found
+            far *= SHORTER
+            reach = np.clip(np.outer((-far, far), np.ones(self.model.nv)), bounds[0], bounds[1])
+            found = self.step(q, goals, most=reach, midway=midway, within=FARTHER)
+        return q
+
+    def _merit(self, q: Array, goals: Goals) -> float:
+        """The cost of a posture (nq,) with overlaps, which cost as much as what is held most firmly."""
+        over = np.minimum(self._workspace.near(q, CLEARANCE).distance - CLEARANCE, 0.0)
+        return self.cost(q, goals) + 0.5 * float(goals.held_weights.max(initial=1.0)) ** 2 * float(over @ over)
 
     def reached(self, before: Array | None, q: Array, most: Array) -> Array:
         """The posture nearest to q (nq,) that is at most (nv,) from the posture before in time."""

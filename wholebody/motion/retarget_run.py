@@ -293,7 +293,7 @@ class Run:
         for _ in range(FIRST if before is None else FORWARD):
             if before is None:
                 goals = with_values(goals, posture=q)
-            following = self.fitter.step(q, goals, most=self._room(q, before, self.span))
+            following = self.fitter.careful_step(q, goals, self._room(q, before, self.span))
             moved = float(np.abs(pin.difference(self.model, q, following)).max())
             q = following
             if moved < 1e-3:  # rad, m
@@ -339,7 +339,7 @@ class Run:
                 break
             if number >= 4 * SWEEP:  # what is wanted draws q to and fro across an edge: then the least way back inside
                 goals, midway = with_values(goals, posture=q), []
-            q = self.fitter.step(q, goals, most=self._room(q, before, span, after), midway=midway)
+            q = self.fitter.careful_step(q, goals, self._room(q, before, span, after), midway)
         if self.holds.touches:
             self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))

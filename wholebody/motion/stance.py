@@ -23,7 +23,7 @@ from wholebody.base.fields import Checked, Names, Range
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
-from wholebody.motion.footholds import RestLimits, resting
+from wholebody.motion.footholds import Point, RestLimits, resting
 from wholebody.motion.roles import figure_roles
 from wholebody.motion.thing_contacts import least_distance
 from wholebody.motion.windows import Window, runs
@@ -108,8 +108,9 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     settings = StanceFeet() if feet is None else feet
     names = settings.names(figure)
     limits = RestLimits(settings.speed, settings.height, settings.least, slid=np.inf)
-    kinds = [next((k for k, end in enumerate(POINTS, 1) if name.endswith(end)), 0) for name in names]
-    found = resting(paths(figure, q, names), dt, limits, kinds)
+    ends = [next(((k, end) for k, end in enumerate(POINTS, 1) if name.endswith(end)), (0, "")) for name in names]
+    points = [Point(name.removesuffix(end), kind) for name, (kind, end) in zip(names, ends, strict=True)]
+    found = resting(paths(figure, q, names), dt, limits, points)
     return {name: found[:, number] for number, name in enumerate(names)}
 
 

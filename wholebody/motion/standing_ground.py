@@ -14,14 +14,15 @@ from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.base.files import checked_target
-from wholebody.motion.footholds import SPAN, RestLimits, lowest, resting, speeds
+from wholebody.motion.footholds import SPAN, Point, RestLimits, above_ground, lowest, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
-from wholebody.motion.windows import long_runs, runs
+from wholebody.motion.windows import Window, long_runs, runs
 
 FEET = ("ankle", "toe")
 OTHERS = ("hand", "wrist", "knee")
 APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
+GATHERED = 0.8  # share of the time of rests at nearly one height that a level has
 HEIGHT, MOST_FRAMES = Range(-1e6, 1e6, "m"), 10**9
 
 
@@ -138,29 +139,27 @@ class Ground(Checked):
     def chart(self, path: str | os.PathLike[str]) -> str:
         """Draw footholds seen from above and their heights over time into a picture; returns its path."""
         from matplotlib.figure import Figure as Drawing
-        from matplotlib.transforms import ScaledTranslation
 
         target = checked_target(path, "chart: path", "a chart", (".png", ".svg", ".pdf"))
         drawing = Drawing(figsize=(9, 6), layout="constrained")
         seen, timed = drawing.subplots(2, 1)
-        for number, role in enumerate(self.rests):
+        for level in self.levels:
+            timed.axhline(level, color="0.8", linewidth=0.8, zorder=0)
+        shown = [role for role in self.rests if any(each.role == role for each in self.footholds)]
+        for number, role in enumerate(shown):
             mine = [each for each in self.footholds if each.role == role]
-            if not mine:
-                continue
             color, places = f"C{number}", np.array([each.place for each in mine])
             seen.scatter(places[:, 0], places[:, 1], color=color, label=role.replace("_", " "), s=20)
-            # points that rest at one height at one time are drawn beside each other
-            beside = ScaledTranslation(0.0, 5.0 * number / 72.0, drawing.dpi_scale_trans)
-            for each in mine:
+            for each in mine:  # those at one height at one time are drawn one on the other, each narrower
                 times = self.dt * np.array([each.first, each.end])
-                timed.plot(times, 2 * [each.height], color=color, linewidth=3, transform=timed.transData + beside)
+                timed.plot(times, 2 * [each.height], color=color, linewidth=1.2 * (len(shown) - number))
         heights = [each.height for each in self.footholds] or [0.0]
-        seen.set(xlabel="x [m]", ylabel="y [m]", title="footholds from above")
+        seen.set(xlabel="x [m]", ylabel="y [m]", title=f"footholds from above ({self._kind()})")
         seen.set_aspect("equal", adjustable="datalim")
         timed.set(
             xlabel="time [s]", ylabel="height of the ground [m]", title="when each part rests, and at what height"
         )
-        timed.set_ylim(min(heights) - 0.1, max(heights) + 0.1)  # moved lines do not affect the limits
+        timed.set_ylim(min(heights) - 0.1, max(heights) + 0.1)
         timed.set_xlim(0.0, self.dt * max([1, *(each.end for each in self.footholds)]))
         if self.footholds:
             drawing.legend(loc="outside right upper", fontsize="small")
@@ -193,27 +192,21 @@ def ground(
     motion = checked_motion(motion, "ground: motion")
     joints = {role: motion.names.index(name) for role, name in skeleton_roles(motion, names).items()}
     feet = [f"{side}_{part}" for side in ("left", "right") for part in FEET if f"{side}_{part}" in joints]
-    limits, kinds = RestLimits(), [FEET.index(role.split("_")[1]) for role in feet]
+    limits, points = RestLimits(), {role: Point(role.split("_")[0], FEET.index(role.split("_")[1])) for role in feet}
     places = motion.positions[:, [joints[role] for role in feet]]
     # what kneels or lies with its feet up does not stand on them: they are above their knees
     knees = [joints.get(f"{role.split('_')[0]}_knee", joints[role]) for role in feet]
-    marks = resting(places, motion.dt, limits, kinds, places[:, :, 2] <= motion.positions[:, knees, 2])
+    marks = resting(places, motion.dt, limits, list(points.values()), places[:, :, 2] <= motion.positions[:, knees, 2])
     rests = {role: marks[:, k] for k, role in enumerate(feet)}
-    lows = {role: lowest(motion.positions[rests[role], joints[role], 2]) for role in feet if rests[role].any()}
-    parts = {
-        part: min(low for role, low in lows.items() if role.endswith(part))
-        for part in FEET
-        if any(role.endswith(part) for role in lows)
-    }
-    above = {role: parts[role.split("_")[1]] for role in feet if role.split("_")[1] in parts}
     raw = [
         Foothold(role, *run, motion.positions[run.first : run.end, joints[role]].mean(axis=0), 0.0)
         for role in feet
         for run in runs(rests[role])
     ]
-    heights = np.array(
-        [lowest(motion.positions[each.first : each.end, joints[each.role], 2]) - above[each.role] for each in raw]
-    )
+    lows = np.array([lowest(motion.positions[each.first : each.end, joints[each.role], 2]) for each in raw])
+    rise = above_ground([points[each.role] for each in raw], [Window(each.first, each.end) for each in raw], lows)
+    heights = lows - [rise[points[each.role].kind] for each in raw]
+    above = {role: rise[point.kind] for role, point in points.items() if point.kind in rise}
     settled, levels, uneven = _levelled(heights, np.array([each.end - each.first for each in raw]))
     low = float(settled.min()) if len(settled) else 0.0
     settled, above = settled - low, {role: height + low for role, height in above.items()}
@@ -235,11 +228,15 @@ def _levelled(heights: Array, counts: Indices) -> tuple[Array, tuple[float, ...]
     groups = np.split(order, np.flatnonzero(np.diff(heights[order]) > APART) + 1)
     settled, levels, uneven = heights.copy(), list[float](), False
     for group in groups:
-        if np.ptp(heights[group]) > SPREAD:
+        # of a group that is wider than a level: what most rests gather in, as on a box from whose edge a foot slips
+        inside = [(heights[group] >= low) & (heights[group] <= low + SPREAD) for low in heights[group]]
+        densest = max(inside, key=lambda mask: counts[group[mask]].sum())
+        gathered = group[densest]
+        if counts[gathered].sum() < GATHERED * counts[group].sum():
             uneven = True
             continue
-        settled[group] = np.median(np.repeat(heights[group], counts[group]))
-        levels.append(float(settled[group][0]))
+        settled[gathered] = np.median(np.repeat(heights[gathered], counts[gathered]))
+        levels.append(float(settled[gathered][0]))
     low = float(settled.min())
     return settled, (0.0,) if uneven else tuple(level - low for level in levels), uneven
 

@@ -83,7 +83,7 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
         page = motion_curves(motion, {"retargeted": clip}, scene, arguments.names)
         print(f"wrote {write(arguments.html, page)}")
     if arguments.rate is not None:
-        clip = clip.resampled(1.0 / arguments.rate)
+        clip = clip.resampled(1.0 / arguments.rate, smooth=True)
     with bar(said := "checking every pair", len(clip)) as tell:
         show(check(clip, scene, progress=lambda done: tell(done, said)))
     written = clip.write(arguments.out, bare=arguments.bare)
