@@ -52,8 +52,8 @@ class Solution(Shown):
         message: one sentence that explains the status.
         programs: number of quadratic programs that each solver closed, such as {"active set": 7, "semismooth newton":
             1}. There, "active set" is the hot start, "semismooth newton" closed what did not settle, and "not exact"
-            are programs that none closed. Empty for methods without programs. Iterations of qp whose entry of the trace is called
-            "seed" have none: each is a descent by damped least squares.
+            are programs that none closed. Empty for methods without programs. Iterations of qp whose entry of the
+            trace is called "seed" have none: each is a descent by damped least squares.
 
     Examples:
         >>> solution.status, solution.q.shape == standing.shape, solution.trace[-1].goal_error < 1e-5
