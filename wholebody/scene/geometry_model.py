@@ -102,7 +102,8 @@ class SceneGeometry:
         # those of joined figures, "anna/seat", have numbers below zero: each figure's its own
         own = {name: -number for number, name in enumerate(dict.fromkeys(owner.partition("/")[0] for owner in owners))}
         of_figures = {owner: own[owner.partition("/")[0]] if "/" in owner else 0 for owner in owners}
-        numbers = [(of_figures | self.number_of)[owners[k]] for k in standing]
+        numbered = of_figures | self.number_of
+        numbers = [numbered[owners[k]] for k in standing]
         self.standing = standing, np.array(numbers, dtype=np.intp)
         self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`: compile now, not during a solve
