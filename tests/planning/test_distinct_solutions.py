@@ -129,6 +129,21 @@ def test_an_arm_with_a_closed_form_has_all_of_its_branches() -> None:
     assert not wb.solutions(problem, starts=5).complete
 
 
+def test_descents_of_seven_joints_begin_at_the_least_effort_of_each_branch() -> None:
+    """A Panda's elbow is free to turn: where random postures lead to a minimum, one of few descents did before."""
+    figure, ready = known_arm("panda")
+    low, high = figure.limits.lower, figure.limits.upper
+    rng = np.random.default_rng(0)
+    tool = figure.placement(low + (high - low) * rng.uniform(0.2, 0.8, 7), "tool")
+    problem = wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", tool)])
+    found = wb.solutions(problem, most=100, starts=12)
+    assert not found.complete
+    ends = [one for one in wb.methods.QP().minima(problem, rng.uniform(low, high, (40, 7))) if one.solved]
+    assert len(ends) > 20
+    for end in ends:  # valleys are flat: some descents end beside a minimum
+        assert min(abs(end.assessment.measure / one.assessment.measure - 1.0) for one in found) < 0.01
+
+
 def test_parallel_axes_of_a_wrist_leave_postures_between_the_branches() -> None:
     """With the fifth joint at 0 the fourth and the sixth turn about parallel lines, so postures form a curve."""
     figure, ready = known_arm("ur5")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, islice
 from typing import overload
 
 import numpy as np
@@ -81,10 +81,10 @@ def solutions(
 ) -> Solutions:
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
-    Descents begin at the branches of the closed form of an arm of six joints that has one, if none is singular.
-    Otherwise they begin at the problem's start and at random postures all over the limits (a Latin hypercube). Measures
-    count from the problem's start. The search ends where all answers count as found, or after as many starts or
-    seconds.
+    Descents begin at the branches of the closed form of an arm that has one, of seven joints where these take the least
+    effort. If these are not all, they also begin at the problem's start and at random postures (a Latin hypercube).
+    Measures count from the problem's start. The search ends where all answers count as found, or after as many starts
+    or seconds.
 
     Args:
         problem: as for `wb.solve`.
@@ -115,9 +115,10 @@ def solutions(
             return Solutions((), 0, 0, 0, True)
     known: list[Solution] = []
     begun = descents = 0
-    branches, complete = _branches(problem), False
-    total = starts if branches is None else min(starts, len(branches))
-    for start in _starts(problem, starts, seed) if branches is None else branches[:starts]:
+    (branches, every), complete = closed_form_postures(problem), False
+    every = every and len(branches) > 0 and _stand_alone(problem, branches)
+    total = min(starts, len(branches)) if every else starts
+    for start in islice(chain(branches, () if every else _starts(problem, starts, seed)), total):
         left = ends - time.perf_counter()
         if left <= 0.0 and begun:
             break
@@ -129,18 +130,12 @@ def solutions(
             descents += 1
             known = _with(problem, known, answer, apart)
         # After 12 descents minima at limits, which few starts lead to, were missed.
-        complete = all_found(len(known), descents, 40) if branches is None else begun == len(branches)
+        complete = begun == len(branches) if every else all_found(len(known), descents, 40)
         if (told is not None and told(begun, total) is True) or complete:
             break
     complete = complete and _stand_alone(problem, [answer.q for answer in known])
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
-
-
-def _branches(problem: Problem) -> Array | None:
-    """The postures (k, nq) of a closed form; None where there is none, or neighbours of one meet the goals."""
-    found = closed_form_postures(problem)
-    return found if found is not None and _stand_alone(problem, found) else None
 
 
 def _stand_alone(problem: Problem, postures: Iterable[Array]) -> bool:

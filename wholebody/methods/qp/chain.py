@@ -108,18 +108,22 @@ class Asked(NamedTuple):
         return cls(chain.goals(entries), at, nearest, problem.clearances), distance
 
 
-def closed_form_postures(problem: Problem) -> Array | None:
-    """All postures (k, nq) of six joints that meet a placement, free or not; None without a closed form of them."""
-    entries = goal_entries(problem)
+def closed_form_postures(problem: Problem) -> tuple[Array, bool]:
+    """Postures (k, nq) of a closed form that meet a placement or nearly do, free or not, and whether they are all.
+
+    Of seven joints they are those of the least effort along each branch; none without a closed form.
+    """
+    entries, none = goal_entries(problem), np.zeros((0, problem.scene.model.nq))
     with chains_of(problem).borrow() as chains:
         chain = None if entries is None else chains.carrying(entries)
-        if entries is None or chain is None or chain.held >= 0 or len(chain.idx_v) < problem.scene.model.nv:
-            return None
+        if entries is None or chain is None or len(chain.idx_v) < problem.scene.model.nv:
+            return none, False
         asked, _ = Asked.by(problem, chain, entries)
-        if chain.arm is None or not chain.is_guided(asked.goals):
-            return None
+        if not chain.is_guided(asked.goals):
+            return none, False
         values = chain.branches(asked.goals, asked.nearest).least
-        return chain.posture(values, np.tile(asked.at, (len(values), 1))) if len(values) else None
+        found = chain.posture(values, np.tile(asked.at, (len(values), 1))) if len(values) else none
+        return found, chain.arm is not None and chain.held < 0
 
 
 class Descents:
