@@ -288,27 +288,32 @@ class Articulated:
 
         Those of a blow add no kinetic energy.
         """
-        if not len(target):
-            return np.zeros((0, 3)), speed
-        answer = np.linalg.solve(inertia, points.figure.T)
-        mobility = points.figure @ answer
+        impulse, kept = np.zeros((len(target), 3)), np.flatnonzero(target > -np.inf)
+        if not len(kept):
+            return impulse, speed
+        rows = (3 * kept[:, None] + np.arange(3)).ravel()
+        figure, begun = points.figure[rows], speed[rows]
+        mobility = impulse_kernel.mobilities(inertia, figure)
         if points.bodies and self._engine is not None:
             for b, name in enumerate(points.bodies):
-                part = points.things[:, 6 * b : 6 * b + 6]
+                part = points.things[rows, 6 * b : 6 * b + 6]
                 mobility += part @ self._engine.response(name) @ part.T
-        impulse, after = impulse_kernel.impulses(mobility, speed, points.friction, target)
-        flat = impulse.ravel()
-        gain = float(flat @ (speed + after))
+        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept])
+        flat = found.ravel()
+        gain = float(flat @ (begun + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
-            impulse = impulse * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
-            after = speed + mobility @ impulse.ravel()
-        self.velocity = self.velocity + answer @ impulse.ravel()
+            found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+            after = begun + mobility @ found.ravel()
+        impulse[kept] = found
+        self.velocity = self.velocity + np.linalg.solve(inertia, figure.T @ found.ravel())
         for name, c, place, axes in points.pushes:
             push = impulse[c] @ axes
             if push.any():
                 self._engine.push(name, push, place)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
-        return impulse, after
+        velocities = speed.copy()
+        velocities[rows] = after
+        return impulse, velocities
 
     def _move(
         self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float

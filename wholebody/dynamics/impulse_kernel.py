@@ -15,6 +15,51 @@ ROUNDS = 8  # of 50 steps
 COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
 
 
+@compiled(error_model="numpy", fastmath=FAST)
+def mobilities(inertia: Array, rows: Array) -> Array:
+    """Change (k, k) of the velocities along rows (k, n) by unit impulses along them, of an inertia (n, n).
+
+    On one thread: the threads of a BLAS wait for each other longer than they compute, where other programs run.
+    """
+    size, count = inertia.shape[0], rows.shape[0]
+    root, white, found = inertia.copy(), np.empty((size, count)), np.empty((count, count))
+    for j in range(size):  # Cholesky factor, and the rows over it
+        for k in range(j):
+            for i in range(k):
+                root[j, k] -= root[j, i] * root[k, i]
+            root[j, k] /= root[k, k]
+            root[j, j] -= root[j, k] * root[j, k]
+        root[j, j] = np.sqrt(root[j, j])
+        for c in range(count):
+            white[j, c] = rows[c, j]
+        for k in range(j):
+            for c in range(count):
+                white[j, c] -= root[j, k] * white[k, c]
+        for c in range(count):
+            white[j, c] /= root[j, j]
+    across = np.zeros((count + 3, size))
+    for c in range(count):
+        for j in range(size):
+            across[c, j] = white[j, c]
+    for c in range(0, count, 4):  # four at a time: each value is read once for them
+        for d in range(c, count):
+            one, two, three, four = 0.0, 0.0, 0.0, 0.0
+            for j in range(size):
+                value = across[d, j]
+                one += across[c, j] * value
+                two += across[c + 1, j] * value
+                three += across[c + 2, j] * value
+                four += across[c + 3, j] * value
+            found[d, c] = found[c, d] = one
+            if c + 1 < count:
+                found[d, c + 1] = found[c + 1, d] = two
+            if c + 2 < count:
+                found[d, c + 2] = found[c + 2, d] = three
+            if c + 3 < count:
+                found[d, c + 3] = found[c + 3, d] = four
+    return found
+
+
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
 def _push(row: int, one: float, two: float, three: float, mobility: Array, velocity: Array) -> None:
     """Change all velocities by an impulse at the point of three rows; the matrix is symmetric, and read by rows."""
@@ -144,9 +189,7 @@ def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> t
     velocity = speed.copy()
     impulse = solve(mobility, velocity, friction, target, 1000, 1e-7)
     if violation(mobility, velocity, friction, target, impulse) > COARSE:
-        kept = np.flatnonzero(target > -np.inf)
-        rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        impulse[kept] = _refined(mobility[np.ix_(rows, rows)], speed[rows], friction[kept], target[kept], impulse[kept])
+        impulse = _refined(mobility, speed, friction, target, impulse)
         velocity = speed + mobility @ impulse.ravel()
     return impulse, velocity
 
@@ -182,6 +225,7 @@ def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impu
 def compiled_kernel(_: Any) -> None:
     """The loop."""
     eye, three, one = np.eye(3), np.zeros(3), np.zeros(1)
+    mobilities(eye, eye)
     solve(eye, three, one, one, 1, 1e-9)
     _split(eye, np.ones(3), three, one, three.copy(), three.copy(), 1)
     violation(eye, three, one, one, np.zeros((1, 3)))
