@@ -166,9 +166,8 @@ class Articulated:
         energy = engine.energy()
         again = time > SHORTEST and self._stops > 0
         frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
-        twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
         given = frame.wrenches if again else self._left_for_later(frame, segments, energy)
-        self._react(given, twists, segments)
+        self._react({name: wrench for name, wrench in given.items() if name in segments}, motions, time, segments)
         return time, frame
 
     def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
@@ -206,7 +205,6 @@ class Articulated:
         workspace, engine, model = self._workspace, self._engine, self._model
         names = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
         workspace.place({**names, **{name: way[0] for name, way in moved.items()}})
-        pin.computeJointJacobians(model, self._data, self.q)
         twists = [] if engine is None else [engine.twist(name) for name in names]
         speed = max(float(np.abs(one).max(initial=0.0)) for one in [self.velocity, *twists])
         near = workspace.near(self.q, 2e-3 + min(0.2, 1.5 * time * speed))  # m
@@ -228,13 +226,10 @@ class Articulated:
             np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
             np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
         )  # fmt: skip
-        columns = [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
-        # pin gives those of a model of one freedom as a vector
-        jacobians = np.array([np.zeros((6, model.nv)), *(one.reshape(6, -1) for one in columns)])
         axes = axes_of(normal)
         directions = np.concatenate([axes, cross(place[:, None], axes)], axis=2)
-        moves = directions[: len(met)] @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
-        made.figure[: 3 * len(met)] = moves.reshape(-1, model.nv)
+        joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
+        made.figure[: 3 * len(met)] = workspace.state.rows(directions[: len(met)].reshape(-1, 6), *joints)
         made.gap[: len(owners)] = gap
         made.add_owners(self._scene, engine, moved, owners, place, directions, time)
         for c, (freedom, sign, room) in enumerate(limits, len(owners)):
@@ -297,7 +292,10 @@ class Articulated:
         if points.bodies and self._engine is not None:
             for b, name in enumerate(points.bodies):
                 part = points.things[rows, 6 * b : 6 * b + 6]
-                mobility += part @ self._engine.response(name) @ part.T
+                own = np.flatnonzero(part.any(axis=1))
+                part = part[own]
+                # without a BLAS, as `mobilities`
+                mobility[np.ix_(own, own)] += np.einsum("ik,jk->ij", part @ self._engine.response(name), part)
         found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept])
         flat = found.ravel()
         gain = float(flat @ (begun + after))
@@ -382,12 +380,11 @@ class Articulated:
             drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
         self.velocity = drift + velocity
 
-    def _react(self, wrenches: Mapping[str, Array], twists: Mapping[str, Array], segments: Mapping[str, int]) -> None:
+    def _react(self, given: Mapping[str, Array], moved: Moved, time: float, segments: Mapping[str, int]) -> None:
         """Give the figure the impulses that things gave its segments while they went on, and no energy beside.
 
         For the things the segments are as heavy as anything; what weighs much more than they do would throw them.
         """
-        given = {name: wrench for name, wrench in wrenches.items() if name in segments and wrench.any()}
         if not given:
             return
         model, data, energy = self._model, self._data, self.energy()
@@ -398,7 +395,8 @@ class Articulated:
             joint = model.frames[segments[name]].parentJoint
             if joint:
                 total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrench
-                energy += float(wrench @ twists[name])
+                before, after = moved[name]
+                energy += float(wrench @ pin.log6(after * before.inverse()).vector) / time
         self.velocity = self.velocity + np.linalg.solve(inertia, total)
         pushed, first = inertia @ self.velocity, model.idx_vs
         momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]

@@ -45,19 +45,22 @@ class Points(NamedTuple):
             directions: (k, 3, 6) rows that take a twist at the origin to velocities along the axes of each point.
             time: of the step, seconds.
         """
+        surfaces = {both: surface_of(scene, *both) for both in set(owners)}
+        places = {name: 6 * b for b, name in enumerate(self.bodies)}
         for c, both in enumerate(owners):
-            here, axes = slice(3 * c, 3 * c + 3), directions[c, :, :3]
-            self.restitution[c], self.friction[c] = surface_of(scene, *both)
+            self.restitution[c], self.friction[c] = surfaces[both]
             for owner, sign in zip(both, (-1.0, 1.0), strict=True):
-                if owner in self.bodies and engine is not None:
-                    b = 6 * self.bodies.index(owner)
+                if owner not in places and owner not in moved:
+                    continue
+                here, axes, self.driven[c] = slice(3 * c, 3 * c + 3), directions[c, :, :3], True
+                if owner in places and engine is not None:
+                    b = places[owner]
                     lever = place[c] - engine.centre(owner)
                     self.things[here, b : b + 6] += sign * np.hstack([axes, axes @ pin.skew(lever).T])
                     self.pushes.append((owner, c, place[c], sign * axes))
                 if owner in moved:
                     before, after = moved[owner]
                     self.given[here] += sign * directions[c] @ pin.log6(after * before.inverse()).vector / time
-                self.driven[c] |= owner in self.bodies or owner in moved
 
 
 def axes_of(normal: Array) -> Array:

@@ -15,6 +15,21 @@ ROUNDS = 8  # of 50 steps
 COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
 
 
+@compiled(inner=True, error_model="numpy", fastmath=FAST)
+def _root(matrix: Array) -> Array:
+    """The Cholesky factor (n, n), lower, of a matrix; what it has above its diagonal has no meaning."""
+    root = matrix.copy()
+    for j in range(len(root)):
+        for k in range(j):
+            found = root[j, k]
+            for i in range(k):
+                found -= root[j, i] * root[k, i]
+            root[j, k] = found / root[k, k]
+            root[j, j] -= root[j, k] * root[j, k]
+        root[j, j] = np.sqrt(root[j, j])
+    return root
+
+
 @compiled(error_model="numpy", fastmath=FAST)
 def mobilities(inertia: Array, rows: Array) -> Array:
     """Change (k, k) of the velocities along rows (k, n) by unit impulses along them, of an inertia (n, n).
@@ -22,14 +37,8 @@ def mobilities(inertia: Array, rows: Array) -> Array:
     On one thread: the threads of a BLAS wait for each other longer than they compute, where other programs run.
     """
     size, count = inertia.shape[0], rows.shape[0]
-    root, white, found = inertia.copy(), np.empty((size, count)), np.empty((count, count))
-    for j in range(size):  # Cholesky factor, and the rows over it
-        for k in range(j):
-            for i in range(k):
-                root[j, k] -= root[j, i] * root[k, i]
-            root[j, k] /= root[k, k]
-            root[j, j] -= root[j, k] * root[j, k]
-        root[j, j] = np.sqrt(root[j, j])
+    root, white, found = _root(inertia), np.empty((size, count)), np.empty((count, count))
+    for j in range(size):
         for c in range(count):
             white[j, c] = rows[c, j]
         for k in range(j):
@@ -124,12 +133,12 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
 
 @compiled(error_model="numpy", fastmath=FAST)
 def _split(
-    inverse: Array, weight: Array, rest: Array, friction: Array, impulse: Array, dual: Array, most: int
+    mobility: Array, weight: Array, rest: Array, friction: Array, impulse: Array, dual: Array, most: int
 ) -> tuple[float, float]:
     """Steps of the alternating direction method: by how much the impulses broke the program, and the laws of contact.
 
     Args:
-        inverse: (3 m, 3 m) of the mobilities and the weights.
+        mobility: (3 m, 3 m).
         weight: (3 m,) of what the laws of contact change.
         rest: (3 m,) velocities without impulses, less the targets.
         friction: (m,).
@@ -138,17 +147,26 @@ def _split(
         most: steps.
     """
     size = len(rest)
-    right, free, broken, moved = np.empty(size), np.empty(size), 0.0, 0.0
+    weighted, found, free, broken, moved = mobility.copy(), np.empty(size), np.empty(size), 0.0, 0.0
+    for k in range(size):
+        weighted[k, k] += weight[k]
+    root = _root(weighted)
     for _ in range(most):
         for k in range(size):
-            right[k] = weight[k] * impulse[k] - rest[k] - dual[k]
+            found[k] = weight[k] * impulse[k] - rest[k] - dual[k]
+        for k in range(size):
+            part = found[k]
+            for j in range(k):
+                part -= root[k, j] * found[j]
+            found[k] = part / root[k, k]
+        for k in range(size - 1, -1, -1):
+            found[k] /= root[k, k]
+            for j in range(k):
+                found[j] -= root[k, j] * found[k]
         broken, moved = 0.0, 0.0
         for k in range(size):
-            found = 0.0
-            for j in range(size):
-                found += inverse[k, j] * right[j]
-            broken += weight[k] * (found - impulse[k]) ** 2
-            free[k] = OVER * found + (1.0 - OVER) * impulse[k]
+            broken += weight[k] * (found[k] - impulse[k]) ** 2
+            free[k] = OVER * found[k] + (1.0 - OVER) * impulse[k]
         for c in range(len(friction)):
             row = 3 * c
             now = max(0.0, free[row] + dual[row] / weight[row])
@@ -208,8 +226,7 @@ def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impu
     best, least = impulse, violation(mobility, speed + mobility @ impulse.ravel(), friction, target, impulse)
     for _ in range(ROUNDS):
         weight = share * own.ravel()
-        inverse = np.linalg.inv(mobility + np.diag(weight)).astype(np.float64)
-        broken, moved = _split(inverse, weight, rest, friction, now, dual, 50)
+        broken, moved = _split(mobility, weight, rest, friction, now, dual, 50)
         off = violation(mobility, speed + mobility @ now, friction, target, now.reshape(-1, 3))
         if off < least:
             best, least = now.reshape(-1, 3).copy(), off
