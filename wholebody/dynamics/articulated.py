@@ -24,16 +24,18 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Actuated
-from wholebody.dynamics.figure_points import Moved, Points, axes_of
+from wholebody.dynamics.figure_points import Moved, Points, axes_of, near_limits
 from wholebody.dynamics.frame import EngineFrame, impacts
-from wholebody.dynamics.pieces import places
+from wholebody.dynamics.pieces import places, surface_of
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.figures.state import free_roots
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
+from wholebody.scene.matter.body import Surface
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
+LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 STOPS = 12  # steps of a frame that are made again to end at an impact: what is squeezed meets thousands
 FASTEST = 0.5  # m/s, at most
@@ -63,7 +65,7 @@ class Articulated:
         self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked = self.q
+        self._tracked, self._surfaces = self.q, dict[tuple[str, str], Surface]()
         light = self._inertia(self.q).diagonal() < 1e-5  # kg m2: of links without mass
         self._model.armature += np.where(light, 1e-5, 0.0)
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
@@ -81,10 +83,10 @@ class Articulated:
         steady = pin.difference(self._model, self._tracked, tracked) / dt
         now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, STOPS, {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
-            shares = (now / dt, min(1.0, (now + min(left, STEP)) / dt))
+            shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
             aim = np.asarray(pin.integrate(self._model, self._tracked, steady * now))
-            step = self._step(min(left, STEP), aim, steady, motions, segments)
+            step = self._step(min(left, LONGEST), aim, steady, motions, segments)
             now, left = now + step, left - step
             self.ends.append(now)
         self._tracked = np.array(tracked)
@@ -132,7 +134,7 @@ class Articulated:
         points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
-        time = self._until_impact(points, time)
+        time = self._until_impact(points, min(time, STEP) if points.bodies else time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
         middle, mean = self.q, begin
@@ -220,29 +222,21 @@ class Articulated:
             owners, gap = met + whose, np.concatenate([gap, np.maximum(others.gap, SKIN)])
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
         bodies = sorted({name for both in owners for name in both if name in names})
-        limits = self._limits(time)
+        limits = near_limits(model, self._limited, self.q, self.velocity, time)
         count = len(owners) + len(limits)
-        made = Points(
-            np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
-            np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
-        )  # fmt: skip
+        made = Points.room(count, model.nv, bodies)
         axes = axes_of(normal)
         directions = np.concatenate([axes, cross(place[:, None], axes)], axis=2)
         joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
         made.figure[: 3 * len(met)] = workspace.state.rows(directions[: len(met)].reshape(-1, 6), *joints)
         made.gap[: len(owners)] = gap
-        made.add_owners(self._scene, engine, moved, owners, place, directions, time)
+        for both in set(owners) - self._surfaces.keys():
+            self._surfaces[both] = surface_of(self._scene, *both)
+        made.add_owners(self._surfaces, engine, moved, owners, place, directions, time)
         for c, (freedom, sign, room) in enumerate(limits, len(owners)):
             made.figure[3 * c, freedom], made.gap[c] = sign, room
         self.points = count
         return made
-
-    def _limits(self, time: float) -> list[tuple[int, float, float]]:
-        """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is."""
-        at, freedom = self._limited.T
-        gaps = self.q[at] - self._model.lowerPositionLimit[at], self._model.upperPositionLimit[at] - self.q[at]
-        near = [gap < 0.02 + 1.5 * time * np.abs(self.velocity[freedom]) for gap in gaps]  # rad, m
-        return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""

@@ -58,7 +58,9 @@ class BodiesState:
     def stop(self, numbers: Indices, at: Array) -> None:
         """Let bodies (k,) stand at placements (k, 4, 4)."""
         self.bodies.rotation[numbers] = at[:, :3, :3]
-        self.bodies.position[numbers] = at[:, :3, 3] + np.einsum("kij,kj->ki", at[:, :3, :3], self.pieces.centre[numbers])
+        self.bodies.position[numbers] = at[:, :3, 3] + np.einsum(
+            "kij,kj->ki", at[:, :3, :3], self.pieces.centre[numbers]
+        )
         self.bodies.twist[numbers] = 0.0
 
     def copies(self) -> tuple[Array, Array, Array]:

@@ -9,10 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, cross
-from wholebody.dynamics.pieces import surface_of
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.scene.scene import Scene
+from wholebody.scene.matter.body import Surface
 
 Moved = Mapping[str, tuple[pin.SE3, pin.SE3]]
 
@@ -30,14 +29,29 @@ class Points(NamedTuple):
     bodies: list[str]  # (b,)
     driven: NDArray[np.bool_]  # (m,) points of what moves
 
+    @staticmethod
+    def room(count: int, freedoms: int, bodies: list[str]) -> Points:
+        """Points of which nothing is known yet, near bodies that move by themselves."""
+        rows, one = 3 * count, np.zeros(count)
+        return Points(
+            np.zeros((rows, freedoms)), np.zeros((rows, 6 * len(bodies))), np.zeros(rows), one, one.copy(), one.copy(),
+            [], bodies, np.zeros(count, dtype=bool),
+        )  # fmt: skip
+
     def add_owners(
-        self, scene: Scene, engine: RigidBodies | None, moved: Moved, owners: Sequence[tuple[str, str]], place: Array,
-        directions: Array, time: float,
-    ) -> None:  # fmt: skip
+        self,
+        surfaces: Mapping[tuple[str, str], Surface],
+        engine: RigidBodies | None,
+        moved: Moved,
+        owners: Sequence[tuple[str, str]],
+        place: Array,
+        directions: Array,
+        time: float,
+    ) -> None:
         """Add what the things at the first points are.
 
         Args:
-            scene: has the surfaces.
+            surfaces: what happens where both touch.
             engine: has the bodies.
             moved: things to their placements before and after the step.
             owners: (k,) both that touch, by name.
@@ -45,7 +59,6 @@ class Points(NamedTuple):
             directions: (k, 3, 6) rows that take a twist at the origin to velocities along the axes of each point.
             time: of the step, seconds.
         """
-        surfaces = {both: surface_of(scene, *both) for both in set(owners)}
         places = {name: 6 * b for b, name in enumerate(self.bodies)}
         for c, both in enumerate(owners):
             self.restitution[c], self.friction[c] = surfaces[both]
@@ -68,3 +81,21 @@ def axes_of(normal: Array) -> Array:
     first = cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1)[:, None]
     return np.stack([normal, first, cross(normal, first)], axis=1)
+
+
+def near_limits(
+    model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
+) -> list[tuple[int, float, float]]:
+    """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is.
+
+    Args:
+        model: has the limits.
+        limited: (k, 2) places of freedoms in q and in the velocity.
+        q: (nq,) posture.
+        velocity: (nv,).
+        time: seconds.
+    """
+    at, freedom = limited.T
+    gaps = q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]
+    near = [gap < 0.02 + 1.5 * time * np.abs(velocity[freedom]) for gap in gaps]  # rad, m
+    return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
