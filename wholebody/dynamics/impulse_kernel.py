@@ -18,7 +18,7 @@ COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refi
 @compiled(inner=True, error_model="numpy", fastmath=FAST)
 def _root(matrix: Array) -> Array:
     """The Cholesky factor (n, n), lower, of a matrix; what it has above its diagonal has no meaning."""
-    root = matrix.copy()
+    root: Array = matrix.copy()
     for j in range(len(root)):
         for k in range(j):
             found = root[j, k]
