@@ -23,7 +23,8 @@ from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
 SETTLING = 90  # frames after the mouse or a key lets go in which the figure still follows to where that was
-STILL = 1e-5  # m, rad: what moves less is not sent
+STILL = 1e-5  # m, rad: a figure that moves less has arrived
+UNSEEN = 2e-4  # m, rad: what is this near to where it was sent is not sent again: less is exact, and slower
 
 KEYS = """arrow keys move the chosen handle, shift with up and down moves it away and back, Escape: {escape}
 <img src="data:," hidden onerror="document.documentElement.addEventListener('keydown', event =>
@@ -344,7 +345,9 @@ class LivePage:
         with self.server.atomic():  # one message for all: each wakes the thread that sends
             self._place(frame.q, {})
             for name, ball in self._handles.items():
-                ball.position = self.drag.place(name)
+                place = self.drag.place(name)
+                if np.abs(place - ball.position).max() > UNSEEN:
+                    ball.position = place
             self._show_rings()
             self._status.content = f"**{frame.status}**"
             self._numbers.content = (
@@ -363,10 +366,13 @@ class LivePage:
                 place = at[owner] * scene.objects[owner].placement.actInv(place)
             values[number] = pin.SE3ToXYZQUAT(place)
         with self.server.atomic():
-            for number in np.flatnonzero(~(np.abs(values - self._sent) <= STILL).all(axis=1)).tolist():
-                piece = self._pieces[number]
-                piece.position, piece.wxyz = values[number, :3], values[number, [6, 3, 4, 5]]
-                self._sent[number] = values[number]
+            # each costs viser more than the physics of a piece
+            moved = ~(np.abs(values - self._sent) <= UNSEEN)
+            for number in np.flatnonzero(moved[:, :3].any(axis=1)).tolist():
+                self._pieces[number].position = self._sent[number, :3] = values[number, :3]
+            for number in np.flatnonzero(moved[:, 3:].any(axis=1)).tolist():
+                self._sent[number, 3:] = values[number, 3:]
+                self._pieces[number].wxyz = values[number, [6, 3, 4, 5]]
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:
