@@ -23,8 +23,7 @@ from wholebody.view.style import LOOK
 from wholebody.view.viser_server import viser_server
 
 SETTLING = 90  # frames after the mouse or a key lets go in which the figure still follows to where that was
-STILL = 1e-5  # m, rad: a figure that moves less has arrived
-UNSEEN = 2e-4  # m, rad: what is this near to where it was sent is not sent again: less is exact, and slower
+STILL = 1e-5  # m, rad: what moves less is not sent
 
 KEYS = """arrow keys move the chosen handle, shift with up and down moves it away and back, Escape: {escape}
 <img src="data:," hidden onerror="document.documentElement.addEventListener('keydown', event =>
@@ -346,7 +345,7 @@ class LivePage:
             self._place(frame.q, {})
             for name, ball in self._handles.items():
                 place = self.drag.place(name)
-                if np.abs(place - ball.position).max() > UNSEEN:
+                if np.abs(place - ball.position).max() > STILL:
                     ball.position = place
             self._show_rings()
             self._status.content = f"**{frame.status}**"
@@ -367,7 +366,7 @@ class LivePage:
             values[number] = pin.SE3ToXYZQUAT(place)
         with self.server.atomic():
             # each costs viser more than the physics of a piece
-            moved = ~(np.abs(values - self._sent) <= UNSEEN)
+            moved = ~(np.abs(values - self._sent) <= STILL)
             for number in np.flatnonzero(moved[:, :3].any(axis=1)).tolist():
                 self._pieces[number].position = self._sent[number, :3] = values[number, :3]
             for number in np.flatnonzero(moved[:, 3:].any(axis=1)).tolist():
