@@ -23,16 +23,18 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel
-from wholebody.dynamics.coupling import Actuated, Moved, Points, axes_of
+from wholebody.dynamics.coupling import Actuated, Moved, Points, axes_of, near_limits
 from wholebody.dynamics.frame import EngineFrame, impacts
-from wholebody.dynamics.pieces import places
+from wholebody.dynamics.pieces import places, surface_of
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN
 from wholebody.figures.state import free_roots
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
+from wholebody.scene.matter.body import Surface
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
+LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 STOPS = 12  # steps of a frame that are made again to end at an impact: what is squeezed meets thousands
 FASTEST = 0.5  # m/s, at most
@@ -62,7 +64,7 @@ class Articulated:
         self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked = self.q
+        self._tracked, self._surfaces = self.q, dict[tuple[str, str], Surface]()
         light = self._inertia(self.q).diagonal() < 1e-5  # kg m2: of links without mass
         self._model.armature += np.where(light, 1e-5, 0.0)
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
@@ -80,10 +82,10 @@ class Articulated:
         steady = pin.difference(self._model, self._tracked, tracked) / dt
         now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, STOPS, {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
-            shares = (now / dt, min(1.0, (now + min(left, STEP)) / dt))
+            shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
             aim = np.asarray(pin.integrate(self._model, self._tracked, steady * now))
-            step = self._step(min(left, STEP), aim, steady, motions, segments)
+            step = self._step(min(left, LONGEST), aim, steady, motions, segments)
             now, left = now + step, left - step
             self.ends.append(now)
         self._tracked = np.array(tracked)
@@ -131,7 +133,7 @@ class Articulated:
         points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
-        time = self._until_impact(points, time)
+        time = self._until_impact(points, min(time, STEP) if points.bodies else time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
         soft = time * self.damping + time * time * self.stiffness
         middle, mean = self.q, begin
@@ -165,9 +167,8 @@ class Articulated:
         energy = engine.energy()
         again = time > SHORTEST and self._stops > 0
         frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
-        twists = {name: pin.log6(way[1] * way[0].inverse()).vector / time for name, way in motions.items()}
         given = frame.wrenches if again else self._left_for_later(frame, segments, energy)
-        self._react(given, twists, segments)
+        self._react({name: wrench for name, wrench in given.items() if name in segments}, motions, time, segments)
         return time, frame
 
     def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
@@ -205,7 +206,6 @@ class Articulated:
         workspace, engine, model = self._workspace, self._engine, self._model
         names = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
         workspace.place({**names, **{name: way[0] for name, way in moved.items()}})
-        pin.computeJointJacobians(model, self._data, self.q)
         twists = [] if engine is None else [engine.twist(name) for name in names]
         speed = max(float(np.abs(one).max(initial=0.0)) for one in [self.velocity, *twists])
         near = workspace.near(self.q, 2e-3 + min(0.2, 1.5 * time * speed))  # m
@@ -221,32 +221,21 @@ class Articulated:
             owners, gap = met + whose, np.concatenate([gap, np.maximum(others.gap, SKIN)])
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
         bodies = sorted({name for both in owners for name in both if name in names})
-        limits = self._limits(time)
+        limits = near_limits(model, self._limited, self.q, self.velocity, time)
         count = len(owners) + len(limits)
-        made = Points(
-            np.zeros((3 * count, model.nv)), np.zeros((3 * count, 6 * len(bodies))), np.zeros(3 * count),
-            np.zeros(count), np.zeros(count), np.zeros(count), [], bodies, np.zeros(count, dtype=bool),
-        )  # fmt: skip
-        columns = [pin.getJointJacobian(model, self._data, joint, pin.WORLD) for joint in range(1, model.njoints)]
-        # pin gives those of a model of one freedom as a vector
-        jacobians = np.array([np.zeros((6, model.nv)), *(one.reshape(6, -1) for one in columns)])
+        made = Points.room(count, model.nv, bodies)
         axes = axes_of(normal)
         directions = np.concatenate([axes, cross(place[:, None], axes)], axis=2)
-        moves = directions[: len(met)] @ (jacobians[rows.second[kept]] - jacobians[rows.first[kept]])
-        made.figure[: 3 * len(met)] = moves.reshape(-1, model.nv)
+        joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
+        made.figure[: 3 * len(met)] = workspace.state.rows(directions[: len(met)].reshape(-1, 6), *joints)
         made.gap[: len(owners)] = gap
-        made.add_owners(self._scene, engine, moved, owners, place, directions, time)
+        for both in set(owners) - self._surfaces.keys():
+            self._surfaces[both] = surface_of(self._scene, *both)
+        made.add_owners(self._surfaces, engine, moved, owners, place, directions, time)
         for c, (freedom, sign, room) in enumerate(limits, len(owners)):
             made.figure[3 * c, freedom], made.gap[c] = sign, room
         self.points = count
         return made
-
-    def _limits(self, time: float) -> list[tuple[int, float, float]]:
-        """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is."""
-        at, freedom = self._limited.T
-        gaps = self.q[at] - self._model.lowerPositionLimit[at], self._model.upperPositionLimit[at] - self.q[at]
-        near = [gap < 0.02 + 1.5 * time * np.abs(self.velocity[freedom]) for gap in gaps]  # rad, m
-        return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
@@ -287,27 +276,35 @@ class Articulated:
 
         Those of a blow add no kinetic energy.
         """
-        if not len(target):
-            return np.zeros((0, 3)), speed
-        answer = np.linalg.solve(inertia, points.figure.T)
-        mobility = points.figure @ answer
+        impulse, kept = np.zeros((len(target), 3)), np.flatnonzero(target > -np.inf)
+        if not len(kept):
+            return impulse, speed
+        rows = (3 * kept[:, None] + np.arange(3)).ravel()
+        figure, begun = points.figure[rows], speed[rows]
+        mobility = impulse_kernel.mobilities(inertia, figure)
         if points.bodies and self._engine is not None:
             for b, name in enumerate(points.bodies):
-                part = points.things[:, 6 * b : 6 * b + 6]
-                mobility += part @ self._engine.response(name) @ part.T
-        impulse, after = impulse_kernel.impulses(mobility, speed, points.friction, target)
-        flat = impulse.ravel()
-        gain = float(flat @ (speed + after))
+                part = points.things[rows, 6 * b : 6 * b + 6]
+                own = np.flatnonzero(part.any(axis=1))
+                part = part[own]
+                # without a BLAS, as `mobilities`
+                mobility[np.ix_(own, own)] += np.einsum("ik,jk->ij", part @ self._engine.response(name), part)
+        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept])
+        flat = found.ravel()
+        gain = float(flat @ (begun + after))
         if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
-            impulse = impulse * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
-            after = speed + mobility @ impulse.ravel()
-        self.velocity = self.velocity + answer @ impulse.ravel()
+            found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+            after = begun + mobility @ found.ravel()
+        impulse[kept] = found
+        self.velocity = self.velocity + np.linalg.solve(inertia, figure.T @ found.ravel())
         for name, c, place, axes in points.pushes:
             push = impulse[c] @ axes
             if push.any():
                 self._engine.push(name, push, place)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
-        return impulse, after
+        velocities = speed.copy()
+        velocities[rows] = after
+        return impulse, velocities
 
     def _move(
         self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float
@@ -376,12 +373,11 @@ class Articulated:
             drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
         self.velocity = drift + velocity
 
-    def _react(self, wrenches: Mapping[str, Array], twists: Mapping[str, Array], segments: Mapping[str, int]) -> None:
+    def _react(self, given: Mapping[str, Array], moved: Moved, time: float, segments: Mapping[str, int]) -> None:
         """Give the figure the impulses that things gave its segments while they went on, and no energy beside.
 
         For the things the segments are as heavy as anything; what weighs much more than they do would throw them.
         """
-        given = {name: wrench for name, wrench in wrenches.items() if name in segments and wrench.any()}
         if not given:
             return
         model, data, energy = self._model, self._data, self.energy()
@@ -392,7 +388,8 @@ class Articulated:
             joint = model.frames[segments[name]].parentJoint
             if joint:
                 total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrench
-                energy += float(wrench @ twists[name])
+                before, after = moved[name]
+                energy += float(wrench @ pin.log6(after * before.inverse()).vector) / time
         self.velocity = self.velocity + np.linalg.solve(inertia, total)
         pushed, first = inertia @ self.velocity, model.idx_vs
         momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]

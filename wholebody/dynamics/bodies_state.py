@@ -49,14 +49,23 @@ class BodiesState:
         rotation = self.bodies.rotation[number]
         return pin.SE3(rotation.copy(), self.bodies.position[number] - rotation @ self.pieces.centre[number])
 
-    def give(self, number: int, before: pin.SE3, after: pin.SE3, time: float) -> None:
-        """Let a body move from one placement to another within a time, at constant velocity and angular velocity."""
-        self.put(number, before)
-        centre = self.pieces.centre[number]
-        way = after.translation + after.rotation @ centre - self.bodies.position[number]
-        self.velocity[number] = way / time
-        self.spin[number] = pin.log3(after.rotation @ before.rotation.T) / time
-        self.bodies.given[number] = bool(self.velocity[number].any() or self.spin[number].any())
+    def give(self, numbers: Indices, placed: Array, time: float) -> None:
+        """Let bodies (k,) move between placements (k, 2, 4, 4) in a time, at constant velocity and angular velocity."""
+        turned, bodies = placed[:, :, :3, :3], self.bodies
+        centres = placed[:, :, :3, 3] + np.einsum("kbij,kj->kbi", turned, self.pieces.centre[numbers])
+        turns = turned[:, 1] @ turned[:, 0].transpose(0, 2, 1)
+        bodies.rotation[numbers], bodies.position[numbers] = turned[:, 0], centres[:, 0]
+        self.velocity[numbers] = (centres[:, 1] - centres[:, 0]) / time
+        self.spin[numbers] = np.array([pin.log3(turn) for turn in turns]).reshape(-1, 3) / time
+        bodies.given[numbers] = bodies.twist[numbers].any(axis=1)
+
+    def stop(self, numbers: Indices, at: Array) -> None:
+        """Let bodies (k,) stand at placements (k, 4, 4)."""
+        self.bodies.rotation[numbers] = at[:, :3, :3]
+        self.bodies.position[numbers] = at[:, :3, 3] + np.einsum(
+            "kij,kj->ki", at[:, :3, :3], self.pieces.centre[numbers]
+        )
+        self.bodies.twist[numbers] = 0.0
 
     def copies(self) -> tuple[Array, Array, Array]:
         """Copies of positions, rotations and velocities."""

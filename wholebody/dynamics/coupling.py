@@ -24,17 +24,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, cross
+from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
-from wholebody.dynamics.pieces import surface_of
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
-from wholebody.scene.scene import Scene
 
 Gains = float | Mapping[str, float] | None
 RATE = 2500.0  # 1/s^2: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg
@@ -260,14 +258,29 @@ class Points(NamedTuple):
     bodies: list[str]  # (b,)
     driven: NDArray[np.bool_]  # (m,) points of what moves
 
+    @staticmethod
+    def room(count: int, freedoms: int, bodies: list[str]) -> Points:
+        """Points of which nothing is known yet, near bodies that move by themselves."""
+        rows, one = 3 * count, np.zeros(count)
+        return Points(
+            np.zeros((rows, freedoms)), np.zeros((rows, 6 * len(bodies))), np.zeros(rows), one, one.copy(), one.copy(),
+            [], bodies, np.zeros(count, dtype=bool),
+        )  # fmt: skip
+
     def add_owners(
-        self, scene: Scene, engine: RigidBodies | None, moved: Moved, owners: Sequence[tuple[str, str]], place: Array,
-        directions: Array, time: float,
-    ) -> None:  # fmt: skip
+        self,
+        surfaces: Mapping[tuple[str, str], Surface],
+        engine: RigidBodies | None,
+        moved: Moved,
+        owners: Sequence[tuple[str, str]],
+        place: Array,
+        directions: Array,
+        time: float,
+    ) -> None:
         """Add what the things at the first points are.
 
         Args:
-            scene: has the surfaces.
+            surfaces: what happens where both touch.
             engine: has the bodies.
             moved: things to their placements before and after the step.
             owners: (k,) both that touch, by name.
@@ -275,19 +288,21 @@ class Points(NamedTuple):
             directions: (k, 3, 6) rows that take a twist at the origin to velocities along the axes of each point.
             time: of the step, seconds.
         """
+        places = {name: 6 * b for b, name in enumerate(self.bodies)}
         for c, both in enumerate(owners):
-            here, axes = slice(3 * c, 3 * c + 3), directions[c, :, :3]
-            self.restitution[c], self.friction[c] = surface_of(scene, *both)
+            self.restitution[c], self.friction[c] = surfaces[both]
             for owner, sign in zip(both, (-1.0, 1.0), strict=True):
-                if owner in self.bodies and engine is not None:
-                    b = 6 * self.bodies.index(owner)
+                if owner not in places and owner not in moved:
+                    continue
+                here, axes, self.driven[c] = slice(3 * c, 3 * c + 3), directions[c, :, :3], True
+                if owner in places and engine is not None:
+                    b = places[owner]
                     lever = place[c] - engine.centre(owner)
                     self.things[here, b : b + 6] += sign * np.hstack([axes, axes @ pin.skew(lever).T])
                     self.pushes.append((owner, c, place[c], sign * axes))
                 if owner in moved:
                     before, after = moved[owner]
                     self.given[here] += sign * directions[c] @ pin.log6(after * before.inverse()).vector / time
-                self.driven[c] |= owner in self.bodies or owner in moved
 
 
 def axes_of(normal: Array) -> Array:
@@ -295,3 +310,21 @@ def axes_of(normal: Array) -> Array:
     first = cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1)[:, None]
     return np.stack([normal, first, cross(normal, first)], axis=1)
+
+
+def near_limits(
+    model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
+) -> list[tuple[int, float, float]]:
+    """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is.
+
+    Args:
+        model: has the limits.
+        limited: (k, 2) places of freedoms in q and in the velocity.
+        q: (nq,) posture.
+        velocity: (nv,).
+        time: seconds.
+    """
+    at, freedom = limited.T
+    gaps = q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]
+    near = [gap < 0.02 + 1.5 * time * np.abs(velocity[freedom]) for gap in gaps]  # rad, m
+    return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]

@@ -135,22 +135,26 @@ def one_frame(frames: Sequence[EngineFrame], ends: Sequence[float]) -> EngineFra
     )
 
 
-def given_placements(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-    """The placements before and after of what is moved in a frame, checked."""
+def given_placements(kinematic: object) -> tuple[list[str], Array]:
+    """What is moved in a frame, checked: its names, and the placements (k, 2, 4, 4) before and after."""
     if kinematic is None:
-        return {}
+        return [], np.zeros((0, 2, 4, 4))
     given = checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
-    return {name: _two_placements(pair, name) for name, pair in given.items()}
+    pairs = [pair if _usual(pair) else _two_placements(pair, name) for name, pair in given.items()]
+    placed = np.array([(before.homogeneous, after.homogeneous) for before, after in pairs]).reshape(-1, 2, 4, 4)
+    if not np.isfinite(placed).all():
+        placed = np.array([[one.homogeneous for one in _two_placements(pair, name)] for name, pair in given.items()])
+    return list(given), placed
+
+
+def _usual(pair: object) -> bool:
+    return type(pair) is tuple and len(pair) == 2 and type(pair[0]) is type(pair[1]) is pin.SE3
 
 
 def _two_placements(pair: object, name: str) -> tuple[pin.SE3, pin.SE3]:
-    """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
         raise InputError(
             f"kinematic: {checks.shown(name)} has {checks.shown(pair)}; give its placements before and after"
         )
-    before, after = (
-        one if isinstance(one, pin.SE3) and np.isfinite(one.homogeneous).all() else placement(one, f"kinematic: {name}")
-        for one in pair
-    )
+    before, after = (placement(one, f"kinematic: {name}") for one in pair)
     return before, after

@@ -15,6 +15,60 @@ ROUNDS = 8  # of 50 steps
 COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
 
 
+@compiled(inner=True, error_model="numpy", fastmath=FAST)
+def _root(matrix: Array) -> Array:
+    """The Cholesky factor (n, n), lower, of a matrix; what it has above its diagonal has no meaning."""
+    root: Array = matrix.copy()
+    for j in range(len(root)):
+        for k in range(j):
+            found = root[j, k]
+            for i in range(k):
+                found -= root[j, i] * root[k, i]
+            root[j, k] = found / root[k, k]
+            root[j, j] -= root[j, k] * root[j, k]
+        root[j, j] = np.sqrt(root[j, j])
+    return root
+
+
+@compiled(error_model="numpy", fastmath=FAST)
+def mobilities(inertia: Array, rows: Array) -> Array:
+    """Change (k, k) of the velocities along rows (k, n) by unit impulses along them, of an inertia (n, n).
+
+    On one thread: the threads of a BLAS wait for each other longer than they compute, where other programs run.
+    """
+    size, count = inertia.shape[0], rows.shape[0]
+    root, white, found = _root(inertia), np.empty((size, count)), np.empty((count, count))
+    for j in range(size):
+        for c in range(count):
+            white[j, c] = rows[c, j]
+        for k in range(j):
+            for c in range(count):
+                white[j, c] -= root[j, k] * white[k, c]
+        for c in range(count):
+            white[j, c] /= root[j, j]
+    across = np.zeros((count + 3, size))
+    for c in range(count):
+        for j in range(size):
+            across[c, j] = white[j, c]
+    for c in range(0, count, 4):  # four at a time: each value is read once for them
+        for d in range(c, count):
+            one, two, three, four = 0.0, 0.0, 0.0, 0.0
+            for j in range(size):
+                value = across[d, j]
+                one += across[c, j] * value
+                two += across[c + 1, j] * value
+                three += across[c + 2, j] * value
+                four += across[c + 3, j] * value
+            found[d, c] = found[c, d] = one
+            if c + 1 < count:
+                found[d, c + 1] = found[c + 1, d] = two
+            if c + 2 < count:
+                found[d, c + 2] = found[c + 2, d] = three
+            if c + 3 < count:
+                found[d, c + 3] = found[c + 3, d] = four
+    return found
+
+
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
 def _push(row: int, one: float, two: float, three: float, mobility: Array, velocity: Array) -> None:
     """Change all velocities by an impulse at the point of three rows; the matrix is symmetric, and read by rows."""
@@ -79,12 +133,12 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
 
 @compiled(error_model="numpy", fastmath=FAST)
 def _split(
-    inverse: Array, weight: Array, rest: Array, friction: Array, impulse: Array, dual: Array, most: int
+    mobility: Array, weight: Array, rest: Array, friction: Array, impulse: Array, dual: Array, most: int
 ) -> tuple[float, float]:
     """Steps of the alternating direction method: by how much the impulses broke the program, and the laws of contact.
 
     Args:
-        inverse: (3 m, 3 m) of the mobilities and the weights.
+        mobility: (3 m, 3 m).
         weight: (3 m,) of what the laws of contact change.
         rest: (3 m,) velocities without impulses, less the targets.
         friction: (m,).
@@ -93,17 +147,26 @@ def _split(
         most: steps.
     """
     size = len(rest)
-    right, free, broken, moved = np.empty(size), np.empty(size), 0.0, 0.0
+    weighted, found, free, broken, moved = mobility.copy(), np.empty(size), np.empty(size), 0.0, 0.0
+    for k in range(size):
+        weighted[k, k] += weight[k]
+    root = _root(weighted)
     for _ in range(most):
         for k in range(size):
-            right[k] = weight[k] * impulse[k] - rest[k] - dual[k]
+            found[k] = weight[k] * impulse[k] - rest[k] - dual[k]
+        for k in range(size):
+            part = found[k]
+            for j in range(k):
+                part -= root[k, j] * found[j]
+            found[k] = part / root[k, k]
+        for k in range(size - 1, -1, -1):
+            found[k] /= root[k, k]
+            for j in range(k):
+                found[j] -= root[k, j] * found[k]
         broken, moved = 0.0, 0.0
         for k in range(size):
-            found = 0.0
-            for j in range(size):
-                found += inverse[k, j] * right[j]
-            broken += weight[k] * (found - impulse[k]) ** 2
-            free[k] = OVER * found + (1.0 - OVER) * impulse[k]
+            broken += weight[k] * (found[k] - impulse[k]) ** 2
+            free[k] = OVER * found[k] + (1.0 - OVER) * impulse[k]
         for c in range(len(friction)):
             row = 3 * c
             now = max(0.0, free[row] + dual[row] / weight[row])
@@ -144,9 +207,7 @@ def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> t
     velocity = speed.copy()
     impulse = solve(mobility, velocity, friction, target, 1000, 1e-7)
     if violation(mobility, velocity, friction, target, impulse) > COARSE:
-        kept = np.flatnonzero(target > -np.inf)
-        rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        impulse[kept] = _refined(mobility[np.ix_(rows, rows)], speed[rows], friction[kept], target[kept], impulse[kept])
+        impulse = _refined(mobility, speed, friction, target, impulse)
         velocity = speed + mobility @ impulse.ravel()
     return impulse, velocity
 
@@ -165,8 +226,7 @@ def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impu
     best, least = impulse, violation(mobility, speed + mobility @ impulse.ravel(), friction, target, impulse)
     for _ in range(ROUNDS):
         weight = share * own.ravel()
-        inverse = np.linalg.inv(mobility + np.diag(weight)).astype(np.float64)
-        broken, moved = _split(inverse, weight, rest, friction, now, dual, 50)
+        broken, moved = _split(mobility, weight, rest, friction, now, dual, 50)
         off = violation(mobility, speed + mobility @ now, friction, target, now.reshape(-1, 3))
         if off < least:
             best, least = now.reshape(-1, 3).copy(), off
@@ -182,6 +242,7 @@ def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impu
 def compiled_kernel(_: Any) -> None:
     """The loop."""
     eye, three, one = np.eye(3), np.zeros(3), np.zeros(1)
+    mobilities(eye, eye)
     solve(eye, three, one, one, 1, 1e-9)
     _split(eye, np.ones(3), three, one, three.copy(), three.copy(), 1)
     violation(eye, three, one, one, np.zeros((1, 3)))

@@ -178,7 +178,8 @@ class RigidBodies:
         return self.state.momentum()
 
     def _number(self, name: str) -> int:
-        return self._pieces.index[checks.known(name, self._pieces.index, "body")]
+        index = self._pieces.index
+        return index[name if type(name) is str and name in index else checks.known(name, index, "body")]
 
     def advance(
         self,
@@ -200,15 +201,15 @@ class RigidBodies:
             until: ends the frame early, to be taken back, where an impact with those is faster than this, m/s.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
-        state, given = self.state, {self._number(name): pair for name, pair in given_placements(kinematic).items()}
+        state, names, placed = self.state, *given_placements(kinematic)
+        given: Indices = np.array([self._number(name) for name in names], dtype=np.intp)
+        for number in given[self._pieces.dynamic[given]]:
+            raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
         ended = state.copies()
-        for number, (before, after) in given.items():
-            if self._pieces.dynamic[number]:
-                raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
-            state.give(number, before, after, dt)
+        state.give(given, placed, dt)
         self._sleepers.wake_where_put(self._finder, ended)
-        self._borne = np.isin(self.names, list(borne))
-        self._yielding = np.isin(self.names, list(yielding)) & np.isfinite(self._pieces.mass)
+        self._borne = np.array([name in borne for name in self.names])
+        self._yielding = np.array([name in yielding for name in self.names]) & np.isfinite(self._pieces.mass)
         count = int(np.ceil(dt / STEP - 1e-9))
         # early ends of steps: eight for a dozen bodies, as each costs a step of all of them
         stops = 96 // max(12, int(state.bodies.moving.sum()))
@@ -219,9 +220,7 @@ class RigidBodies:
             end = dt * (number + 1) / count
             while end - record.time > 1e-9 * dt and not (until < np.inf and record.met(yielding, until)):
                 self._step(end - record.time, record)
-        for number, (_, after) in given.items():
-            state.put(number, after)
-            state.bodies.twist[number] = 0.0
+        state.stop(given, placed[:, 1])
         state.bodies.given[:] = False
         self._sleepers.update(self._near, dt)
         self.time += dt

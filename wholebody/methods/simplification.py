@@ -32,7 +32,6 @@ from wholebody.geometry.proximity import PairTable
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry, SceneObject
 from wholebody.scene.scene import Scene
-from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.solution import Solution
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.frame import Hold
@@ -283,8 +282,9 @@ def reachable_pairs(problem: Problem, kept: set[int], rests: Mask, numbers: Indi
         reach = Reach(model, start, _resting(scene.geometry, table.reach), joint, kept)
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
     views = [(reach.seen_from(0), 0.0), *((b, 1e-3) for b in held_balls(scene.figure, reach, problem.constraints))]
-    with borrowed(scene.built, Workspace.refresh) as workspace:
-        at = workspace.proximity.placements(workspace.state.update(start).data)
+    data = model.createData()
+    pin.forwardKinematics(model, data, start)
+    at = np.array([_columns(data.oMi[piece.parentJoint] * piece.placement) for piece in scene.geometry.geometryObjects])
     open_, fixed = np.ones(len(pairs), dtype=bool), rests[joint[pairs]]
     row = np.flatnonzero(fixed[:, 0] != fixed[:, 1])
     side = fixed[row, 1].astype(np.intp)  # of the piece that is fixed
@@ -309,6 +309,11 @@ def _of_figure(figure: Figure) -> Reach:
     """The bounds of a figure of which nothing is frozen or carries things, which are known once they were asked for."""
     table = PairTable(figure.model, figure.geometry)
     return Reach(figure.model, figure.neutral, _resting(figure.geometry, table.reach), table.joint, ())
+
+
+def _columns(at: pin.SE3) -> list[Array]:
+    """Columns of a placement's rotation, and its translation; a workspace has them too, and takes longer to make."""
+    return [*at.rotation.T, at.translation]
 
 
 def _resting(geometry: pin.GeometryModel, radius: Array) -> Balls:

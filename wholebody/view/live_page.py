@@ -344,7 +344,9 @@ class LivePage:
         with self.server.atomic():  # one message for all: each wakes the thread that sends
             self._place(frame.q, {})
             for name, ball in self._handles.items():
-                ball.position = self.drag.place(name)
+                place = self.drag.place(name)
+                if np.abs(place - ball.position).max() > STILL:
+                    ball.position = place
             self._show_rings()
             self._status.content = f"**{frame.status}**"
             self._numbers.content = (
@@ -363,10 +365,13 @@ class LivePage:
                 place = at[owner] * scene.objects[owner].placement.actInv(place)
             values[number] = pin.SE3ToXYZQUAT(place)
         with self.server.atomic():
-            for number in np.flatnonzero(~(np.abs(values - self._sent) <= STILL).all(axis=1)).tolist():
-                piece = self._pieces[number]
-                piece.position, piece.wxyz = values[number, :3], values[number, [6, 3, 4, 5]]
-                self._sent[number] = values[number]
+            # each costs viser more than the physics of a piece
+            moved = ~(np.abs(values - self._sent) <= STILL)
+            for number in np.flatnonzero(moved[:, :3].any(axis=1)).tolist():
+                self._pieces[number].position = self._sent[number, :3] = values[number, :3]
+            for number in np.flatnonzero(moved[:, 3:].any(axis=1)).tolist():
+                self._sent[number, 3:] = values[number, 3:]
+                self._pieces[number].wxyz = values[number, [6, 3, 4, 5]]
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:
