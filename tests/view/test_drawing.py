@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from wholebody.base.errors import InputError
-from wholebody.geometry.placement import quaternions
-from wholebody.motion.clip import steady
+from wholebody.geometry.placement import quaternions, steady
 from wholebody.view import drawing
 from wholebody.view.style import LOOK
 

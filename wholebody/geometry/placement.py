@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.base.arrays import Array
 from wholebody.base.checks import array, numbers
 from wholebody.base.errors import InputError
 
@@ -119,3 +120,10 @@ def _check_values(values: NDArray[np.float64], what: str) -> None:
     if not np.isfinite(values).all():
         raise InputError(f"{what}: not every value is finite; give finite numbers")
     raise InputError(f"{what}: a value is beyond {FARTHEST:g}; give metres")
+
+
+def steady(turns: Array) -> Array:
+    """Quaternions (n, ..., 4), in place, each of the sign with which it is nearest to the one before."""
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
+    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
+    return turns

@@ -19,7 +19,7 @@ from wholebody.base.checks import array, instance, listed, number, shown, text, 
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
-from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.geometry.placement import PlacementLike, placement, steady
 from wholebody.motion.mirroring import PLACEMENT, mirrored
 from wholebody.motion.resampling import splined
 
@@ -371,13 +371,6 @@ def thing_tracks(given: Mapping[str, Iterable[PlacementLike]], frames: int, what
         values.setflags(write=False)
         found[name] = values
     return found
-
-
-def steady(turns: Array) -> Array:
-    """Quaternions (n, ..., 4), in place, each of the sign with which it is nearest to the one before."""
-    flips = np.where((turns[1:] * turns[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
-    turns[1:] *= np.cumprod(flips, axis=0)[..., None]
-    return turns
 
 
 def _placed(track: Array, place: float) -> Array:

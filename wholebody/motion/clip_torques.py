@@ -17,8 +17,9 @@ from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
+from wholebody.geometry.placement import steady
 from wholebody.geometry.proximity import Contacts
-from wholebody.motion.clip import Clip, same_joints, steady
+from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.footholds import RestLimits
 from wholebody.motion.inverse_dynamics import FRICTION, ROOT, InverseDynamics, Stand, Touches, foot_wrenches
 from wholebody.motion.stance import FEET, own_feet, standing_feet

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.placement import quaternions
-from wholebody.motion.clip import steady
+from wholebody.geometry.placement import quaternions, steady
 from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
 from wholebody.view.server import Command, Server, Store

@@ -20,7 +20,8 @@ from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import load
-from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE, steady
+from wholebody.geometry.placement import steady
+from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
 from wholebody.motion.files.base import Frames, Motion
 
 VERSION = 1  # of the layout of the arrays

@@ -20,7 +20,7 @@ from wholebody.figures.joining import joint_in
 from wholebody.figures.link_pieces import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
 from wholebody.geometry.gltf import VERTICES, GltfBuilder
-from wholebody.motion.clip import steady
+from wholebody.geometry.placement import steady
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 

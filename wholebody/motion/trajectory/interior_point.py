@@ -14,8 +14,6 @@ band, in the order of the frames. docs/theory/trajectory.md has the reasons.
 
 from __future__ import annotations
 
-import sys
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +21,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.compiled import compiled
+from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
 
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
 LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one that has none opposite
@@ -339,50 +337,3 @@ def _share(values: Array, change: Array) -> float:
     """The largest share of a change, at most 1, that keeps values positive."""
     less = change < 0.0
     return min(1.0, float((-values[less] / change[less]).min(initial=1.0)))
-
-
-@compiled(fastmath=True)
-def add_rows(band: Array, first: Indices, begins: Indices, values: Array, weights: Array) -> None:
-    """Add the sum over rows r of w_r a_r a_r' to a symmetric band matrix."""
-    # `band` (n, k): entry (j, i) is at row j + i, column j; `first` (m,) columns, `begins` (m + 1,) into `values`.
-    for row in range(len(first)):
-        begin, end = begins[row], begins[row + 1]
-        for at in range(begin, end):
-            scaled = weights[row] * values[at]
-            if scaled != 0.0:
-                column = first[row] + at - begin
-                for to in range(at, end):
-                    band[column, to - at] += scaled * values[to]
-
-
-@compiled(fastmath=True)
-def add_sums(
-    band: Array, first: Indices, begins: Indices, values: Array, factors: Array, members: Indices, groups: Indices,
-    weights: Array,
-) -> None:  # fmt: skip
-    """Add the sum over groups g of w_g v_g v_g', v_g the group's rows times their factors; see `add_rows`."""
-    total = np.zeros(band.shape[0])
-    for group in range(len(groups) - 1):
-        least, most = band.shape[0], 0
-        for k in range(groups[group], groups[group + 1]):
-            row = members[k]
-            begin, end, column = begins[row], begins[row + 1], first[row]
-            if end > begin:
-                least, most = min(least, column), max(most, column + end - begin)
-                for at in range(begin, end):
-                    total[column + at - begin] += factors[row] * values[at]
-        for column in range(least, most):
-            scaled = weights[group] * total[column]
-            if scaled != 0.0:
-                for to in range(column, most):
-                    band[column, to - column] += scaled * total[to]
-        total[least:most] = 0.0
-
-
-def compiled_kernel() -> ModuleType:
-    """This module, with its loops compiled or loaded from the cache."""
-    none, places, band = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 1))
-    begins = np.zeros(1, dtype=np.intp)
-    add_rows(band, places, begins, none, none)
-    add_sums(band, places, begins, none, none, places, begins, none)
-    return sys.modules[__name__]
