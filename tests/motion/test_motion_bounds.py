@@ -55,11 +55,11 @@ def test_one_jump_in_a_long_calm_clip_is_seen_where_it_is(planar_arm: Callable[.
 
 
 def test_what_a_method_leaves_rough_is_made_smooth(human: Figure) -> None:
-    """Interpolated frames have kinks at their ends: without the bounds the jerk is seven times the original's."""
+    """Interpolated frames have kinks at their ends: without the bounds the jerk is 3.5 times the original's."""
     original, method = synthetic("squat", human), "bisection"
     rough = wb.avoid(original, method=method, constraints=[wb.motion.MotionBounds(None, None, None)])
     assert rough.report.solved
-    assert jerk_ratio(original, rough.clip) > 5.0
+    assert jerk_ratio(original, rough.clip) > 3.0
     smooth = wb.avoid(original, method=method)
     assert smooth.report.solved, smooth.report.message
     assert smooth.report.smoothed
