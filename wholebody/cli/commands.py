@@ -144,7 +144,7 @@ paths:
   FILE      from the start through the points of a text file: x y z in metres, one point a line""",
         option("task", type=Path, metavar="TASK.toml", help="the task file"),
         _path_or_live,
-        option("--method", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton along a path, qp with --live)"),
+        option("--method", default="qp", metavar="NAME", help=f"{', '.join(METHODS)} (default: qp)"),
         option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
         option("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)"),
         option("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)"),

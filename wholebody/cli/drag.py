@@ -38,7 +38,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Drag, assess, report and write; 1 if the end is not met or something was penetrated."""
     if arguments.live:
         return live(arguments)
-    arguments.method = arguments.method or "newton"
     method_named(arguments.method)
     task = read_task(arguments.task)
     goal = _goal(task.problem, arguments.goal)
@@ -70,7 +69,7 @@ def live(arguments: argparse.Namespace) -> int:
     if not 1024 <= arguments.port <= 65535:
         raise InputError(f"--port is {arguments.port}; give a number from 1024 to 65535")
     task = read_task(arguments.task)
-    drag = LiveDrag(task.problem, arguments.method or "qp")
+    drag = LiveDrag(task.problem, arguments.method)
     out = arguments.out or Path("out") / "drag" / arguments.task.stem
     make_folder(out)
 
