@@ -15,7 +15,7 @@ group = Group(
     "measure steps, solves and problem sets, beside other tools where installed",
     """\
 Measure what the package does, and write the numbers as CSV, the charts as SVG and PNG, and tables to read. Times depend
-on the machine and on what else runs on it: compare ratios of one run. Set OMP_NUM_THREADS=1 for steady ones.""",
+on the machine and on what else runs on it: compare ratios of one run.""",
     (
         command(
             "compare",
