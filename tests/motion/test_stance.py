@@ -36,6 +36,13 @@ def test_a_foot_that_swings_does_not_stand(avatar: wb.Figure) -> None:
         assert not found[f"left_{point}"][11:19].any()
 
 
+def test_a_foot_that_glides_slowly_does_not_stand(avatar: wb.Figure) -> None:
+    """A clip of a figure has no markers that tremble: what moves on by 0.18 m/s does not rest at 0.15."""
+    q = np.tile(avatar.posture("standing"), (30, 1))
+    q[:, 0] += 0.18 / 30 * np.arange(30)
+    assert not np.any(list(standing(avatar, q, 1 / 30).values()))
+
+
 def legs_that_cross(avatar: wb.Figure) -> wb.Clip:
     """The left leg passes through the right one, on which the figure stands."""
     q0 = avatar.posture("standing")

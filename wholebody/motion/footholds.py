@@ -19,7 +19,7 @@ NEARBY = 0.8  # m: ground farther away than a step says nothing of the height he
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
 SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
-STAYED, TREMBLES = 0.1, 0.01  # s before and after a frame; m by which a point that rests goes to and fro, as markers do
+TREMBLES = 0.01  # m: by which a point that rests goes to and fro, as markers do
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -30,6 +30,7 @@ class RestLimits(NamedTuple):
     height: float = 0.05  # m, largest height above the lowest rest nearby
     least: float = 0.1  # s, shortest rest
     slid: float = 0.08  # m: a point that goes on farther while it is slow has made a step, and rests at two places
+    stayed: float = 0.1  # s before and after a frame in which a point that trembles stays; 0 in clips, where none does
 
 
 def speeds(places: Array, dt: float, span: float = 0.0) -> Array:
@@ -45,9 +46,11 @@ def speeds(places: Array, dt: float, span: float = 0.0) -> Array:
     return np.asarray(np.linalg.norm(places[last] - places[first], axis=-1) / times)
 
 
-def _steady(places: Array, dt: float) -> Array:
+def _steady(places: Array, dt: float, stayed: float) -> Array:
     """(n,) speeds of a point (n, 3) between two frames, or of going through its extent over more where that is less."""
-    half, last = max(1, round(STAYED / dt)), len(places) - 1
+    if stayed == 0.0:
+        return speeds(places, dt, SPAN)
+    half, last = max(1, round(stayed / dt)), len(places) - 1
     near = np.clip(np.arange(len(places))[:, None] + np.arange(-half, half + 1), 0, last)
     extent = np.linalg.norm(np.ptp(places[near], axis=1), axis=1) - TREMBLES
     return np.asarray(np.minimum(speeds(places, dt, SPAN), extent / (dt * np.maximum(near[:, -1] - near[:, 0], 1))))
@@ -99,7 +102,7 @@ def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point
 
 def slow(places: Array, dt: float, limits: RestLimits) -> Mask:
     """(n,) rest frames of a point (n, 3) by speed alone; the fastest frames of a slow motion separate two rests."""
-    speed = _steady(places, dt)
+    speed = _steady(places, dt, limits.stayed)
     low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
     kept = np.zeros(len(speed), dtype=bool)
     for run in runs(high):

@@ -93,7 +93,7 @@ def resting_hands(scene: Scene, q: Array, dt: float, hands: Sequence[str]) -> tu
     """What holds the hands that rest in each of the frames q (n, nq), and which rest too deep to be held; or ""."""
     model, data = scene.model, scene.model.createData()
     held: list[list[Hold]] = [[] for _ in q]
-    sunk, limits = list[str](), RestLimits()
+    sunk, limits = list[str](), RestLimits(stayed=0.0)
     ids = {name: scene.frame_id(name) for name in hands}
     ids |= {thing.segment: scene.frame_id(thing.segment) for thing in scene.objects.values() if thing.segment}
     at: dict[str, list[pin.SE3]] = {name: [] for name in ids}

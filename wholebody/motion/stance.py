@@ -107,7 +107,7 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     """For each foot in which frames of (n, nq), `dt` seconds apart, it stands: name -> (n,)."""
     settings = StanceFeet() if feet is None else feet
     names = settings.names(figure)
-    limits = RestLimits(settings.speed, settings.height, settings.least, slid=np.inf)
+    limits = RestLimits(settings.speed, settings.height, settings.least, slid=np.inf, stayed=0.0)
     ends = [next(((k, end) for k, end in enumerate(POINTS, 1) if name.endswith(end)), (0, "")) for name in names]
     points = [Point(name.removesuffix(end), kind) for name, (kind, end) in zip(names, ends, strict=True)]
     found = resting(paths(figure, q, names), dt, limits, points)
