@@ -1,7 +1,7 @@
 """The command `wholebody`: one file for each of its commands.
 
 Linear algebra computes on one thread, unless the environment says otherwise: on matrices as small as ours threads wait
-for each other, which takes twice as long, or eight times where other processes compute too.
+for each other, which takes twice as long, or seven times where other processes compute too.
 """
 
 import os

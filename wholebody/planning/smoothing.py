@@ -10,6 +10,7 @@ import pinocchio as pin
 from scipy.ndimage import gaussian_filter1d
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.figures.model_check import joint_of
 from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
@@ -65,7 +66,7 @@ def _together(model: pin.Model, freedom: int, rng: np.random.Generator) -> list[
     roots = [joint.nv for joint in model.joints if joint.nv == 6]
     if not roots:
         return [freedom]
-    number = next(k for k, joint in enumerate(model.joints) if joint.idx_v <= freedom < joint.idx_v + joint.nv)
+    number = joint_of(model, freedom)
     if model.joints[number].nv == 6:
         chosen = [number]
     else:
