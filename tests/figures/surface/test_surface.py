@@ -205,6 +205,20 @@ def test_what_is_far_from_a_joint_moves_with_its_segment(name: str) -> None:
     assert count > 1000
 
 
+@pytest.mark.parametrize("sex", ["female", "male"])
+def test_below_a_raised_shoulder_the_flank_is_nearly_as_wide(sex: str) -> None:
+    figure = load("human", sex=sex, percentile=50)
+    bones, parts, surface = patches_of(figure)
+    q = figure.posture("hands_up")
+    moved = zip(surface.patches, bent(figure, bones, parts, q), strict=True)
+    points = np.concatenate([vertices for patch, vertices in moved if "hand" not in patch.name])
+    shoulder = figure.placement(q, "left_upper_arm").translation
+    edges = shoulder[2] + np.array([-0.08, -0.06, 0.02, 0.04])
+    heights = np.digitize(points[:, 2], edges)
+    below, shoulders = (points[heights == band, 1].max() for band in (1, 3))
+    assert below > 0.85 * shoulders  # 0.72 where the shoulder hangs over the chest
+
+
 def test_the_index_finger_ends_where_the_frame_is() -> None:
     figure = load("human")
     bones, parts, surface = patches_of(figure)
