@@ -1,16 +1,7 @@
-"""Damped least squares: the textbook baseline, which ignores contacts.
+"""Damped least squares, which ignores contacts: docs/theory/damped_least_squares.md has the equations.
 
-The step is that of Wampler 1986 ("Manipulator inverse kinematic solutions based on vector formulations and damped
-least-squares methods") and Nakamura and Hanafusa 1986, ``dq = J' (J J' + lambda^2 I)^-1 e``, with the damping of
-Sugihara 2011 ("Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", eq. 19),
-``lambda^2 = e'e / 2 + damping^2``: small where the goals are met, and large where they cannot be. It bounds every
-step: ``|dq| <= |e| / (2 lambda) < 0.71``.
-
-Equality constraints have priority, and goals act in their null space (Nakamura, Hanafusa and Yoshikawa 1987,
-"Task-priority based redundancy control"): with the projector N on the null space of the equalities,
-``dq = J1# e1 + (J2 N)# (e2 - J2 J1# e1)``. The pseudoinverses are damped, the projector is not, so that a goal out of
-reach does not violate a hold (Baerlocher and Boulic 2004). A joint that a step would move over its limit stops at
-it, and the step is computed again without that joint.
+The damping is that of Sugihara 2011 (eq. 19). Equalities have priority, and goals act in their null space (Nakamura,
+Hanafusa and Yoshikawa 1987), whose projector is not damped (Baerlocher and Boulic 2004).
 """
 
 from __future__ import annotations
@@ -56,9 +47,6 @@ class DampedLeastSquares(Checked, Descends):
             converges faster.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
-
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> wb.solve(problem, wb.methods.DampedLeastSquares(damping=1e-2)).method

@@ -77,9 +77,6 @@ class CCD(Checked, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-
     Examples:
         >>> hand = wb.load("hand")
         >>> tip = wb.Problem(wb.Scene(hand), goals=[wb.Point("right_index_tip", (0.15, 0.03, -0.02))])

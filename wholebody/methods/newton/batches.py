@@ -1,8 +1,7 @@
-"""Equations of bodies, all of one type together: residuals, Jacobians and second derivatives as arrays.
+"""Equations of bodies, all of one type together: residuals and Jacobians as arrays.
 
 A body has seven variables: its position r [m] and its Euler parameters e. Bodies are rows of an array (N + 1, 7) whose
-last row is the world, which does not move and has the index -1. Each batch has k groups of `size` equations between one
-or two bodies.
+last row is the world, with the index -1. A batch has k groups of `size` equations between one or two bodies.
 """
 
 from __future__ import annotations

@@ -1,11 +1,6 @@
 """Inequalities as equations with one slack each: squared slacks (eq. 15) or a logarithmic barrier (eqs. 13 and 14).
 
-In both cases the slack's own equation is scalar and is eliminated analytically. An inequality becomes one row with
-an entry on the diagonal,
-
-    grad phi . d + M y = -c,
-
-so that the pattern of the linear system does not change when an inequality becomes active.
+The slack is eliminated: a row ``grad phi . d + M y = -c`` stays in the pattern, whether it is active or not.
 """
 
 from __future__ import annotations

@@ -1,17 +1,4 @@
-"""The measures: rows of joint angles whose squares are minimised, and the descent of the measures themselves.
-
-A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
-angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
-measure of the revolute joints, and of a free root that one of these measures counts. A measure that says of which
-squares it is the sum, `Rhythm` or `RotationEffort`, has a row for each of them: beside a diagonal that bounds their
-second derivative the steps are many times as many. A measure that depends on other joints is only reported, and the
-solution's message names it.
-
-From a state that satisfies the equations, each round of the descent makes one step in which the motion has little
-weight against the measures, and returns to the equations by Newton steps. It is kept if the measures decreased;
-otherwise the next round is half as long. With the Jacobians alone, convergence is linear, so the steps are accelerated;
-a round whose accelerated step does not lower the measures is repeated with the step itself.
-"""
+"""The measures as rows whose squares are minimised, and the descent of the measures: docs/theory/newton.md."""
 
 from __future__ import annotations
 

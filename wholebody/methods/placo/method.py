@@ -47,7 +47,6 @@ class Placo(Checked, Descends):
             hard tasks contradict each other or what keeps pairs apart.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         MissingPackageError: placo is not installed.
 
     Examples:

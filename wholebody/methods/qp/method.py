@@ -57,7 +57,6 @@ class QP(Settings, Descends):
             the numbers of programs end it, and at last ten seconds of processor time.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         UnknownNameError: there is no such QP solver.
 
     Examples:
