@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
 from wholebody.methods.newton.own_rows import TangentRows, quadratic_model, square_rows
 from wholebody.methods.newton.settings import REFINEMENT
-from wholebody.methods.newton.system import ActiveSystem, System
+from wholebody.methods.newton.system import ActiveSystem
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
@@ -108,11 +108,10 @@ class Objective:
         self._aim(q, -0.5 * gradient / half)
         self.stiffness = REFINEMENT.stiffness * half[self._tangent]
 
-    def enter(self, system: System) -> None:
-        """Write the present factors into a system, whose residual is of the model before."""
-        squares = np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness)
-        system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
-        system.renew(system.batches)
+    @property
+    def factors(self) -> Array:
+        """(rows,) the present factors on the squares of all rows."""
+        return np.append(self.stiffness, np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness))
 
     def _aim(self, q: Array, way: Array) -> None:
         """Count from the posture q (nq,), towards displacements (nv,)."""
@@ -192,14 +191,9 @@ class Refined(NamedTuple):
 
 
 def refine(
-    active_system: ActiveSystem,
-    x: Array,
-    measure: Callable[[Array], float],
-    *,
-    tolerance: float,
-    rounds: int = REFINEMENT.rounds,
+    active_system: ActiveSystem, x: Array, tolerance: float, rounds: int = REFINEMENT.rounds,
     anchor: Array | None = None,
-) -> Refined:
+) -> Refined:  # fmt: skip
     """Lower the measures from x (7 n,), where all equations hold.
 
     With an anchor (7 n,) the measure is the squared motion from there (eq. 1), whose second derivative a step has.
@@ -209,7 +203,7 @@ def refine(
     if not run.met:
         return Refined(x, 0, False)
     run.anchor = anchor
-    descent = _Descent(run, measure, tolerance)
+    descent = _Descent(run, tolerance)
     converged = any(not descent.lower() for _ in range(rounds))
     return Refined(descent.best, len(run.residuals) - 1, converged)
 
@@ -217,9 +211,9 @@ def refine(
 class _Descent:
     """A descent of measures along the equations; `best` (7 n,) is the state with the least."""
 
-    def __init__(self, run: Iteration, measure: Callable[[Array], float], tolerance: float) -> None:
-        self._run, self._measure, self._tolerance = run, measure, tolerance
-        self.best, self._least = run.x, measure(run.x)
+    def __init__(self, run: Iteration, tolerance: float) -> None:
+        self._run, self._tolerance, self.best = run, tolerance, run.x
+        self._least = self._measured()
         self._share, self._memory, self._system = 1.0, Anderson(), run.system
         self._motion = REFINEMENT.motion if run.anchor is None else 1.0
         self._step: Array | None = None  # of the model at the best state, once it is known
@@ -276,8 +270,12 @@ class _Descent:
 
     def _measured(self) -> float:
         """The measures at the iteration's state; infinite where one of one's own is not finite there."""
+        run, active = self._run, self._run.active_system
+        if run.anchor is not None:
+            return float(0.5 * (run.system.weight * (run.x - run.anchor)) @ (run.x - run.anchor))
         try:
-            return self._measure(self._run.x)
+            value: float = active.objective.value(active.posture(run.x))
+            return value
         except UndefinedTermError as error:
-            self._run.active_system.control.step_back(error)
+            active.control.step_back(error)
             return np.inf

@@ -133,6 +133,8 @@ def _local(bodies: FigureBodies, frame: int) -> Any:
 class FigureSystem(ActiveSystem):
     """A problem's equations, renewed from posture to posture: every iterate is a posture."""
 
+    objective: FigureObjective
+
     def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
         """Build the equations; with `yielding`, the violation of the constraints replaces the goals."""
         self.problem, self.workspace, self._yielding = problem, workspace, yielding
@@ -141,8 +143,8 @@ class FigureSystem(ActiveSystem):
         held += bound_equations(problem, bodies, workspace.state).batches()
         if not yielding:
             held += constraint_equations(problem, bodies).batches()
-        self.objective = FigureObjective(problem, bodies, workspace.state)
-        super().__init__([*held, *self.objective.batches()], bodies.weight, algebra, [bodies])
+        objective = FigureObjective(problem, bodies, workspace.state)
+        super().__init__(held, bodies.weight, algebra, [bodies], objective)
         self._find_contacts(problem.clearances, workspace, bodies.data)
         self._own = tuple(filter(is_own, problem.measures))
         self.own_terms = any(map(is_own, (*problem.goals, *problem.constraints, *problem.measures)))
@@ -184,10 +186,7 @@ class FigureSystem(ActiveSystem):
         x = self.retract(x)
         if self._own and (error := undefined(self._own, self.workspace.state.update(self.q))) is not None:
             raise error  # measures are read where a step ends, and not on the way there
-        self.objective.renew(self.q)
-        changed = super().arrive(x)
-        self.objective.enter(self.system)
-        return changed
+        return super().arrive(x)
 
     def _projected(self, x: Array) -> Array:
         x = x.copy()
