@@ -16,8 +16,7 @@ from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
-from wholebody.methods import base
-from wholebody.methods.base import Iterations, TimeLimit, Tolerance, UnsupportedTermError
+from wholebody.methods.base import DAMPING, Iterations, TimeLimit, Tolerance, UnsupportedTermError
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import Control
 from wholebody.methods.differential import REST
@@ -53,22 +52,24 @@ class DampedLeastSquares(Checked, Descends):
         'dls'
     """
 
+    name = "dls"
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 300
-    damping: Annotated[float, base.DAMPING] = 1e-3
+    damping: Annotated[float, DAMPING] = 1e-3
     time_limit: TimeLimit = None
 
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "dls"
-
-    def accepts(self, problem: Problem) -> str | None:
-        """None if all constraints are equalities; otherwise the sentence that names the others."""
-        return base.refusal(self.name, _unsupported(base.check_problem(problem, "DampedLeastSquares.accepts: problem")))
+    def _check_terms(self, problem: Problem) -> None:
+        refused = [
+            f"constraints[{number}], {type(term).__name__} (it is no equality)"
+            for number, term in enumerate(problem.stated)
+            if not np.array_equal(term.lower, term.upper)
+        ]
+        if refused:
+            raise UnsupportedTermError(self.name, refused)
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`; contacts are ignored."""
+        self._check_terms(problem)
         descent = _Descent(problem, self, workspace.state, control)
         converged = descent.run()
         return Ending(
@@ -81,9 +82,6 @@ class _Descent:
     """One descent: the best posture so far, and its trace."""
 
     def __init__(self, problem: Problem, method: DampedLeastSquares, state: State, control: Control) -> None:
-        refused = _unsupported(problem)
-        if refused:
-            raise UnsupportedTermError("dls", refused)
         self._problem, self._method, self._state, self._control = problem, method, state, control
         self.best: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[TraceEntry] = []
@@ -178,12 +176,3 @@ def _damped(jacobian: Array, error: Array, damping: float) -> Array:
     square = jacobian @ jacobian.T
     square[np.diag_indices_from(square)] += 0.5 * float(error @ error) + damping**2
     return np.asarray(jacobian.T @ np.linalg.solve(square, error))
-
-
-def _unsupported(problem: Problem) -> list[str]:
-    """Constraints that are not equalities."""
-    return [
-        f"constraints[{number}], {type(term).__name__} (it is no equality)"
-        for number, term in enumerate(problem.stated)
-        if not np.array_equal(term.lower, term.upper)
-    ]

@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import TOLERANCE, SolvingTracker, UnsupportedTermError, check_problem
+from wholebody.methods.base import TOLERANCE, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -62,15 +62,9 @@ class Newton(Settings, Descends):
         """Name for tables."""
         return f"newton/{self.algebra}"
 
-    def accepts(self, problem: Problem) -> str | None:
-        """None if all terms and joints have equations here; otherwise the sentence that names the others."""
-        check_problem(problem, "Newton.accepts: problem")
+    def _check_terms(self, problem: Problem) -> None:
         with problem.borrow() as workspace:
-            try:
-                state_equations(problem, workspace.state)
-            except UnsupportedTermError as error:
-                return str(error)
-        return None
+            state_equations(problem, workspace.state)
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

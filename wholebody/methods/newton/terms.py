@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody import tasks
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
@@ -19,18 +20,6 @@ from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks import (
-    Axis,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Plane,
-    Point,
-    Posture,
-    Relative,
-    StepLimit,
-)  # fmt: skip
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Goal
 from wholebody.tasks.checks import undefined
@@ -50,17 +39,17 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
     result = EquationSet()
     for number, goal in enumerate(goals):
         label, role = f"goals[{number}], {type(goal).__name__}", Role(goal.weight)
-        if isinstance(goal, Point):
+        if isinstance(goal, tasks.Point):
             point = _local(bodies, goal.place.frame).act(goal.resolved_offset)
             result.coincide(bodies.index(goal.place.joint), -1, label, point, goal.resolved_target, role)
-        elif isinstance(goal, (Frame, Orientation, Relative)):
+        elif isinstance(goal, (tasks.Frame, tasks.Orientation, tasks.Relative)):
             _placement(result, bodies, goal.residual, label, role)
-        elif isinstance(goal, Axis) and goal.toward is None:
+        elif isinstance(goal, tasks.Axis) and goal.toward is None:
             ours = axes_along(_local(bodies, goal.place.frame).rotation @ goal.basis[2])
             result.turn(bodies.index(goal.place.joint), -1, label, ours, axes_along(goal.resolved_target), 2, role)
         else:
             depends = None
-            if isinstance(goal, Posture):  # each joint on itself
+            if isinstance(goal, tasks.Posture):  # each joint on itself
                 joint = np.repeat(np.arange(bodies.model.njoints), bodies.model.nvs)
                 depends = joint[goal.dofs][:, None] == joint
             result.add(goal_rows(bodies, goal, label, depends), role)
@@ -72,9 +61,9 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     result = EquationSet()
     for number, term in enumerate(problem.constraints):
         label = f"constraints[{number}], {type(term).__name__}"
-        if isinstance(term, Hold):
+        if isinstance(term, tasks.Hold):
             _placement(result, bodies, term.residual, label)
-        elif isinstance(term, Plane):
+        elif isinstance(term, tasks.Plane):
             place, body = np.array(_local(bodies, term.place.frame).translation), bodies.index(term.place.joint)
             role = ONE_SIDED if term.side == "above" else HARD
             result.slide(-1, body, label, term.resolved_normal, place, term.height, role)
@@ -89,9 +78,9 @@ def bound_equations(problem: Problem, bodies: FigureBodies, state: State) -> Equ
     """Equations of bounds; the state is moved to the problem's start."""
     result = EquationSet()
     for number, bound in enumerate(problem.bounds):
-        if isinstance(bound, Freeze):
+        if isinstance(bound, tasks.Freeze):
             _frozen(result, bodies, bound, state.update(problem.start))
-        elif not isinstance(bound, StepLimit):  # a solve has no time step, so a step limit bounds nothing
+        elif not isinstance(bound, tasks.StepLimit):  # a solve has no time step, so a step limit bounds nothing
             raise UnsupportedTermError(
                 "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
             )
@@ -111,7 +100,7 @@ def _placement(
         equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, role)
 
 
-def _frozen(equations: EquationSet, bodies: FigureBodies, bound: Freeze, state: State) -> None:
+def _frozen(equations: EquationSet, bodies: FigureBodies, bound: tasks.Freeze, state: State) -> None:
     """Joints that keep their placement relative to their parent at a state."""
     figure, model = bodies.figure, bodies.model
     for name in figure.joint_names(bound.joints):

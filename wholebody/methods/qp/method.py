@@ -86,11 +86,6 @@ class QP(Settings, Descends):
             return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")
         return f"qp/{self.solver}" if self.solver != "active_set" else "qp/active_set, each anew"
 
-    def accepts(self, problem: Problem) -> str | None:
-        """None: every term that says its values and derivatives can be taken."""
-        check_problem(problem, "QP.accepts: problem")
-        return None
-
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""
         met = from_seeds(problem, workspace, self, control)
