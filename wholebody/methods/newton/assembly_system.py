@@ -141,13 +141,8 @@ class AssemblyGoal:
 
     def enter(self, equations: EquationSet) -> None:
         """Add the goal's equations."""
-        local, target = self.local, self.target
-        ends = np.array(local.translation), np.array(target.translation)
-        if self.kind != "orientation":
-            equations.coincide(self.index, -1, self.label, *ends, Role(weight=1.0))
-        if self.kind != "point":
-            turns = pin.Quaternion(local.rotation), pin.Quaternion(target.rotation)
-            equations.turn(self.index, -1, self.label, *turns, 3, Role(weight=1.0))
+        parts = self.kind != "orientation", self.kind != "point"
+        equations.place(self.index, -1, self.label, (self.local, self.target), Role(weight=1.0), parts)
 
 
 def to_target(target: Any, kind: Kind, where: str) -> Any:

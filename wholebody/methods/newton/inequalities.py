@@ -23,15 +23,10 @@ KINDS = ("slack", "barrier")
 
 
 class SquaredSlacks:
-    """phi - Y^2 = 0.
+    """phi - Y^2 = 0: where Y is zero the row is an equation; elsewhere its multiplier vanishes (2 y Y = 0), and the row.
 
-    The derivative by Y is -2 Y, so Newton never moves a slack that is zero: the row is then an equation, phi = 0, and
-    stays one whatever the sign of its multiplier. So slacks at zero are tested after each linear solution: if the
-    multiplier is negative, the slack is released. A slack that the step would take through zero is set to zero; the
-    step is shortened to that point, and the remainder is solved again. Away from zero the multiplier of a slack
-    vanishes (2 y Y = 0) and so does its row. The first solution of a step that crosses no inequality releases all
-    slacks whose multipliers are negative, later ones release the most negative one. The objective of the step decreases
-    from system to system then, so no active set repeats (Nocedal and Wright 2006, "Numerical Optimization", 16.5).
+    The first solution of a step that crosses no inequality releases all slacks with negative multipliers, later ones
+    the most negative one, so no active set repeats (Nocedal and Wright 2006, "Numerical Optimization", 16.5).
     """
 
     def __init__(self, phi: Array) -> None:

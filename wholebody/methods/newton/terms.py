@@ -91,13 +91,9 @@ def _placement(
     equations: EquationSet, bodies: FigureBodies, residual: PlacementResidual, label: str, role: Role = HARD
 ) -> None:
     """The residual of one frame in another: a point that coincides, and axes that agree."""
-    base, local = _local(bodies, residual.base.frame), _local(bodies, residual.place.frame)
+    ends = _local(bodies, residual.base.frame) * residual.placement, _local(bodies, residual.place.frame)
     a, b = bodies.index(residual.base.joint), bodies.index(residual.place.joint)
-    if residual.position:
-        equations.coincide(a, b, label, base.act(residual.placement.translation), np.array(local.translation), role)
-    if residual.orientation:
-        wanted = pin.Quaternion(base.rotation @ residual.placement.rotation)
-        equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, role)
+    equations.place(a, b, label, ends, role, (residual.position, residual.orientation))
 
 
 def _frozen(equations: EquationSet, bodies: FigureBodies, bound: tasks.Freeze, state: State) -> None:
@@ -108,10 +104,9 @@ def _frozen(equations: EquationSet, bodies: FigureBodies, bound: tasks.Freeze, s
         parent = int(model.parents[joint])
         here = state.data.oMi[parent].actInv(state.data.oMi[joint])
         a, b, label = bodies.index(parent), bodies.index(joint), f"Freeze, {name!r}"
-        if model.joints[joint].nv > 1 or not model.joints[joint].shortname().startswith("JointModelR"):
-            equations.coincide(a, b, label, np.array(here.translation), np.zeros(3))
         # of a revolute joint, whose own equations leave only this rotation, two of the three rows are redundant
-        equations.turn(a, b, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
+        moves = model.joints[joint].nv > 1 or not model.joints[joint].shortname().startswith("JointModelR")
+        equations.place(a, b, label, (here, pin.SE3.Identity()), HARD, (moves, True))
 
 
 def _local(bodies: FigureBodies, frame: int) -> Any:
