@@ -148,6 +148,5 @@ class Plane(Constraint):
 
     def jacobian(self, state: State) -> Wrench:
         """One force along the normal."""
-        x, y, z = state.frame(self.place.frame).translation.tolist()
-        a, b, c = self.resolved_normal.tolist()
-        return Wrench(np.array(((a, b, c, y * c - z * b, z * a - x * c, x * b - y * a),)), self.place.joint)
+        forces = point_rows(state.frame(self.place.frame).translation)
+        return Wrench(self.resolved_normal[None] @ forces, self.place.joint)

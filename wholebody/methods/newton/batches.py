@@ -294,16 +294,8 @@ class EquationSet:
         """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or in all axes (size 3)."""
         self._add(f"turn{size}", role, a, b, label, first.coeffs(), second.coeffs())
 
-    def place(
-        self,
-        a: int,
-        b: int,
-        label: str,
-        ends: tuple[Any, Any],
-        role: Role = HARD,
-        parts: tuple[bool, bool] = (True,) * 2,
-    ) -> None:
-        """Placements (pin.SE3) in two bodies coincide: in position, in all axes, or in both."""
+    def place(self, a: int, b: int, label: str, ends: Any, role: Role = HARD, parts: Any = (True, True)) -> None:
+        """Two placements (pin.SE3) in two bodies coincide: in position, in all axes, or in both."""
         first, second = ends
         if parts[0]:
             self.coincide(a, b, label, np.array(first.translation), np.array(second.translation), role)

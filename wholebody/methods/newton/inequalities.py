@@ -23,7 +23,7 @@ KINDS = ("slack", "barrier")
 
 
 class SquaredSlacks:
-    """phi - Y^2 = 0: where Y is zero the row is an equation; elsewhere its multiplier vanishes (2 y Y = 0), and the row.
+    """phi - Y^2 = 0: where Y is zero the row is an equation; elsewhere its multiplier is zero (2 y Y = 0), and the row.
 
     The first solution of a step that crosses no inequality releases all slacks with negative multipliers, later ones
     the most negative one, so no active set repeats (Nocedal and Wright 2006, "Numerical Optimization", 16.5).
