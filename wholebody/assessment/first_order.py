@@ -1,9 +1,4 @@
-"""First-order optimality of a posture, and its blockers: the limits, constraints and contacts with large multipliers.
-
-At an optimum the objective's gradient is a combination of the gradients of all active constraints, with nonnegative
-multipliers for inequalities (Karush, Kuhn and Tucker). Nonnegative least squares finds the combination. Its residual
-measures the distance from an optimum, and its largest parts are the blockers.
-"""
+"""First-order optimality of a posture (Karush, Kuhn and Tucker), and its blockers: what has large multipliers."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The assessment of a motion, a sequence of postures, computed from the postures alone.
-
-The distances of all pairs are computed at every posture, without culling, as `wholebody.assess` does for one posture.
-The motions between postures are swept. No code of a method is used. Frame loops, drags, streams of hard cases, and the
-steps of compared tools are all judged by this module.
-"""
+"""The assessment of a motion, a sequence of postures: all pairs at each of them, and sweeps between them."""
 
 from __future__ import annotations
 

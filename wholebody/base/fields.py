@@ -1,8 +1,4 @@
-"""Checks of the fields of a record, read from their annotations: a range is written once.
-
-``margin: Annotated[float, Range(0.0, 1.0, "m")] = 0.0`` states what the class accepts when it is made. Task files, the
-command line and the documentation read it there with `check_of`.
-"""
+"""Checks of the fields of a record, read from their annotations: a range is written once."""
 
 from __future__ import annotations
 

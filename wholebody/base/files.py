@@ -1,8 +1,4 @@
-"""Files: read with bounds, written whole or not at all, and scratch folders that are removed after a crash.
-
-All code that reads users' files uses this module, so that devices, pipes, folders, huge files and wrong encodings give
-one sentence each. All code that writes files uses it too.
-"""
+"""Files: read with bounds, written whole or not at all, and scratch folders that are removed after a crash."""
 
 from __future__ import annotations
 

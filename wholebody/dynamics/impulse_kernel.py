@@ -8,26 +8,12 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled, with_loops
+from wholebody.base.dense_kernel import factorise, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
 ROUNDS = 8  # of 50 steps
 COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
-
-
-@compiled(inner=True, error_model="numpy", fastmath=FAST)
-def _root(matrix: Array) -> Array:
-    """The Cholesky factor (n, n), lower, of a matrix; what it has above its diagonal has no meaning."""
-    root: Array = matrix.copy()
-    for j in range(len(root)):
-        for k in range(j):
-            found = root[j, k]
-            for i in range(k):
-                found -= root[j, i] * root[k, i]
-            root[j, k] = found / root[k, k]
-            root[j, j] -= root[j, k] * root[j, k]
-        root[j, j] = np.sqrt(root[j, j])
-    return root
 
 
 @compiled(error_model="numpy", fastmath=FAST)
@@ -37,7 +23,8 @@ def mobilities(inertia: Array, rows: Array) -> Array:
     On one thread: the threads of a BLAS wait for each other longer than they compute, where other programs run.
     """
     size, count = inertia.shape[0], rows.shape[0]
-    root, white, found = _root(inertia), np.empty((size, count)), np.empty((count, count))
+    root, white, found = inertia.copy(), np.empty((size, count)), np.empty((count, count))
+    factorise(root)
     for j in range(size):
         for c in range(count):
             white[j, c] = rows[c, j]
@@ -147,22 +134,14 @@ def _split(
         most: steps.
     """
     size = len(rest)
-    weighted, found, free, broken, moved = mobility.copy(), np.empty(size), np.empty(size), 0.0, 0.0
+    root, found, free, broken, moved = mobility.copy(), np.empty(size), np.empty(size), 0.0, 0.0
     for k in range(size):
-        weighted[k, k] += weight[k]
-    root = _root(weighted)
+        root[k, k] += weight[k]
+    factorise(root)
     for _ in range(most):
         for k in range(size):
             found[k] = weight[k] * impulse[k] - rest[k] - dual[k]
-        for k in range(size):
-            part = found[k]
-            for j in range(k):
-                part -= root[k, j] * found[j]
-            found[k] = part / root[k, k]
-        for k in range(size - 1, -1, -1):
-            found[k] /= root[k, k]
-            for j in range(k):
-                found[j] -= root[k, j] * found[k]
+        substitute(root, found)
         broken, moved = 0.0, 0.0
         for k in range(size):
             broken += weight[k] * (found[k] - impulse[k]) ** 2

@@ -1,11 +1,4 @@
-"""Anderson acceleration of the last part of a descent, where steps shrink by the same factor again and again.
-
-The steps know the measures' curvature but not that of the constraints, so the steps f_k near an optimum form a
-linear sequence. From the last few, the combination that would have made the step vanish tells where the sequence leads
-(Walker and Ni 2011, "Anderson acceleration for fixed-point iterations", type II):
-
-    step = f_k - (dX + dF) c,    c = argmin |f_k - dF c|.
-"""
+"""Anderson acceleration (Walker and Ni 2011, type II) of steps that form a linear sequence: docs/theory/qp.md."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ import numpy as np
 from wholebody.assessment.posture import Assessment, judged
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
-from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker, check_problem
+from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker, UnsupportedTermError, check_problem
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import LONGEST, Control, Progress, errors_left
 from wholebody.problem import Problem
@@ -159,6 +159,19 @@ class Descends(ABC):
     @abstractmethod
     def name(self) -> str:
         """Name for tables."""
+
+    def accepts(self, problem: Problem) -> str | None:
+        """None if the method can take all terms; otherwise the sentence that names those that it cannot."""
+        check_problem(problem, f"{type(self).__name__}.accepts: problem")
+        try:
+            self._check_terms(problem)
+        except UnsupportedTermError as error:
+            return str(error)
+        return None
+
+    def _check_terms(self, problem: Problem) -> None:
+        """Raise an `UnsupportedTermError` that lists the terms that this method cannot take; there are none here."""
+        return
 
     @abstractmethod
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:

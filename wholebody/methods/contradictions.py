@@ -1,14 +1,8 @@
 """Contradictions: infeasibility of a problem that is proven before any search.
 
 Joints that cannot turn join segments into rigid groups, and a hold of a frame fixes the placement of its whole group.
-Four kinds of contradictions hold for all values of the other joints: two holds that fix one group at different
-placements; a fixed group that penetrates something that does not move; a range of motion or a reach cone that joints
-which cannot turn violate, wherever the others turn; and a goal for a point of a fixed group at a different position.
-
-A goal for a point that joints of rotation and bounded slides carry from a fixed group is unreachable beyond the sum of
-their distances from each other. A goal inside of something that does not move is unreachable if the point that is to
-reach it lies inside a piece: then the point stays outside by the clearance, and the error is at least the clearance
-plus the goal's depth.
+What two holds, pairs, ranges, cones or goals of such groups ask may contradict for all values of the other joints. A
+goal beyond the distances between joints, or inside of what does not move, has a least error.
 """
 
 from __future__ import annotations

@@ -1,16 +1,7 @@
-"""Damped least squares: the textbook baseline, which ignores contacts.
+"""Damped least squares, which ignores contacts: docs/theory/damped_least_squares.md has the equations.
 
-The step is that of Wampler 1986 ("Manipulator inverse kinematic solutions based on vector formulations and damped
-least-squares methods") and Nakamura and Hanafusa 1986, ``dq = J' (J J' + lambda^2 I)^-1 e``, with the damping of
-Sugihara 2011 ("Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", eq. 19),
-``lambda^2 = e'e / 2 + damping^2``: small where the goals are met, and large where they cannot be. It bounds every
-step: ``|dq| <= |e| / (2 lambda) < 0.71``.
-
-Equality constraints have priority, and goals act in their null space (Nakamura, Hanafusa and Yoshikawa 1987,
-"Task-priority based redundancy control"): with the projector N on the null space of the equalities,
-``dq = J1# e1 + (J2 N)# (e2 - J2 J1# e1)``. The pseudoinverses are damped, the projector is not, so that a goal out of
-reach does not violate a hold (Baerlocher and Boulic 2004). A joint that a step would move over its limit stops at
-it, and the step is computed again without that joint.
+The damping is that of Sugihara 2011 (eq. 19). Equalities have priority, and goals act in their null space (Nakamura,
+Hanafusa and Yoshikawa 1987), whose projector is not damped (Baerlocher and Boulic 2004).
 """
 
 from __future__ import annotations
@@ -25,8 +16,7 @@ from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
-from wholebody.methods import base
-from wholebody.methods.base import Iterations, TimeLimit, Tolerance, UnsupportedTermError
+from wholebody.methods.base import DAMPING, Iterations, TimeLimit, Tolerance, UnsupportedTermError
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import Control
 from wholebody.methods.differential import REST
@@ -57,30 +47,29 @@ class DampedLeastSquares(Checked, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-
     Examples:
         >>> wb.solve(problem, wb.methods.DampedLeastSquares(damping=1e-2)).method
         'dls'
     """
 
+    name = "dls"
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 300
-    damping: Annotated[float, base.DAMPING] = 1e-3
+    damping: Annotated[float, DAMPING] = 1e-3
     time_limit: TimeLimit = None
 
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "dls"
-
-    def accepts(self, problem: Problem) -> str | None:
-        """None if all constraints are equalities; otherwise the sentence that names the others."""
-        return base.refusal(self.name, _unsupported(base.check_problem(problem, "DampedLeastSquares.accepts: problem")))
+    def _check_terms(self, problem: Problem) -> None:
+        refused = [
+            f"constraints[{number}], {type(term).__name__} (it is no equality)"
+            for number, term in enumerate(problem.stated)
+            if not np.array_equal(term.lower, term.upper)
+        ]
+        if refused:
+            raise UnsupportedTermError(self.name, refused)
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`; contacts are ignored."""
+        self._check_terms(problem)
         descent = _Descent(problem, self, workspace.state, control)
         converged = descent.run()
         return Ending(
@@ -93,9 +82,6 @@ class _Descent:
     """One descent: the best posture so far, and its trace."""
 
     def __init__(self, problem: Problem, method: DampedLeastSquares, state: State, control: Control) -> None:
-        refused = _unsupported(problem)
-        if refused:
-            raise UnsupportedTermError("dls", refused)
         self._problem, self._method, self._state, self._control = problem, method, state, control
         self.best: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[TraceEntry] = []
@@ -190,12 +176,3 @@ def _damped(jacobian: Array, error: Array, damping: float) -> Array:
     square = jacobian @ jacobian.T
     square[np.diag_indices_from(square)] += 0.5 * float(error @ error) + damping**2
     return np.asarray(jacobian.T @ np.linalg.solve(square, error))
-
-
-def _unsupported(problem: Problem) -> list[str]:
-    """Constraints that are not equalities."""
-    return [
-        f"constraints[{number}], {type(term).__name__} (it is no equality)"
-        for number, term in enumerate(problem.stated)
-        if not np.array_equal(term.lower, term.upper)
-    ]

@@ -1,8 +1,4 @@
-"""Differential inverse kinematics iterated until a problem is solved, by tools that make one step.
-
-Goals are soft tasks of the tool, constraints are hard ones. The measures have a decreasing weight, steps have a bounded
-size, and the damping grows while steps alternate in direction.
-"""
+"""Differential inverse kinematics iterated until a problem is solved, by tools that make one step."""
 
 from __future__ import annotations
 

@@ -1,15 +1,4 @@
-"""Simplification of problems before they are solved: a presolve (Nocedal and Wright 2006, section 13.7).
-
-Pairs of pieces that cannot come near each other in any allowed posture are redundant constraints. They are dropped,
-with the things that no remaining pair has and the joints that are frozen.
-
-Balls tell which pairs these are. A ball with centre p and radius r on a revolute joint of angle a - h ... a + h stays
-within one ball: the arc of p, at distance d from the axis, has the enclosing ball of radius d sin h about the point at
-distance d cos h from the axis (of radius d about the axis itself from h = 90 degrees on), and r is added. A prismatic
-joint adds half its travel. Towards the leaves the same holds with the inverse motion. So any joint, or a frame that a
-`Hold` keeps in the world, can be the reference. Balls grow from joint to joint and cover every posture: the bound is
-safe, not tight.
-"""
+"""A presolve (Nocedal and Wright 2006): pairs that balls prove apart go; docs/theory/simplification.md."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Checks of what users' terms return, at every call: finite numbers of the right shape.
-
-The methods of a class that derives from a base class of terms are wrapped when the class is made. A wrapped method
-returns numbers or raises a TermError that names the term. Terms of this package are not wrapped: their constructors
-refuse what would make them infinite.
-"""
+"""Checks of what users' terms return, at every call: finite numbers of the right shape, or a TermError."""
 
 from __future__ import annotations
 

@@ -53,8 +53,7 @@ class Axis(Goal):
         basis: (3, 3) rows in the frame: two directions perpendicular to the axis, and the axis, each of length 1.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range. Neither or both of `direction` and `toward`.
-        UnknownNameError: in a problem, a frame that the figure does not have.
+        InputError: neither or both of `direction` and `toward`.
 
     Examples:
         >>> look = wb.Axis("gaze", (1, 0, 0), toward=(0.55, -0.25, 0.95))

@@ -248,7 +248,6 @@ class Balance(Constraint):
 
     Raises:
         InputError: a margin out of range, or feet that do not stand on anything at the start.
-        UnknownNameError: in a problem, a segment that the figure does not have.
 
     Examples:
         >>> steady = wb.Balance(margin=0.02)

@@ -52,6 +52,7 @@ class Term(Checked):
 
     Raises:
         InputError: a value of the wrong kind or out of range; it names the term, the argument and what it takes.
+        UnknownNameError: in a problem, a name that its scene does not have.
 
     Examples:
         >>> isinstance(wb.Point("left_palm", (0.4, 0.2, 1.0)), wb.tasks.Term)

@@ -30,10 +30,6 @@ class Freeze(Bound):
         joints: names of joints and groups; "root" for the figure's placement in the world, "anna/root" for
             that of one of several.
 
-    Raises:
-        InputError: no name.
-        UnknownNameError: in a problem, a joint or group that the figure does not have.
-
     Examples:
         >>> lower_body_stays = wb.Freeze("left_leg", "right_leg", "root")
     """
@@ -74,10 +70,6 @@ class StepLimit(Bound):
         joints: other limits for joints and groups, by name; a later name overrides an earlier one.
         root_velocity: limit of the root's translation, along each of its own axes [m/s].
         root_turn: limit of the root's rotation, about each of its own axes [rad/s].
-
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-        UnknownNameError: in a problem, a joint or group that the figure does not have.
 
     Examples:
         >>> slow = wb.tasks.StepLimit(2.0, joints={"right_arm": 1.0}, root_velocity=0.5)

@@ -1,8 +1,4 @@
-"""What contact terms are made of: a gap between two surfaces, an axis against a face, a place over a face.
-
-Each part has a few rows and their exact derivatives. `ContactTerm` stacks the rows of its parts. It is a goal and a
-constraint: the list of a problem in which it stands decides whether it is met if possible or always.
-"""
+"""What contact terms are made of: a gap between two surfaces, an axis against a face, a place over a face."""
 
 from __future__ import annotations
 

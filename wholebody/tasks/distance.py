@@ -123,9 +123,6 @@ class Effort(DistanceMeasure):
     Attributes:
         weight: factor on the measure [1/rad^2].
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-
     Examples:
         >>> least = wb.Effort(weight=1.0)
     """
@@ -147,9 +144,6 @@ class Displacement(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> upright = wb.tasks.Displacement(weight=0.1)
@@ -208,9 +202,6 @@ class RotationEffort(SumOfSquares):
     Attributes:
         weight: factor on the measure [1/rad^2].
         others: the start, and the weights of all other degrees of freedom; once resolved.
-
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> least = wb.tasks.RotationEffort()
@@ -295,9 +286,6 @@ class Soft(SumOfSquares):
         goal: any goal, such as `wb.Point("left_palm", place)`. Its weight is a factor too.
         weight: factor on the squared error. `Effort` of a person who reaches is about 1: with a weight of 100, 0.1 m
             cost as much.
-
-    Raises:
-        InputError: no goal, or a weight out of range.
 
     Examples:
         >>> rather = wb.Soft(wb.Point("left_palm", (0.3, 0.3, 1.0)), weight=10.0)

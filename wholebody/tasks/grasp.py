@@ -67,8 +67,7 @@ class Grasp(ContactTerm):
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
 
     Raises:
-        InputError: a value of the wrong kind, shape or range. In a problem, a thing that the hand cannot take so.
-        UnknownNameError: in a problem, a name that the scene does not have.
+        InputError: in a problem, a thing that the hand cannot take so.
 
     Examples:
         >>> grip = wb.Grasp("right", "handle", kind="power")

@@ -28,10 +28,6 @@ class Point(Goal):
         offset: (3,) the point in the frame's own axes [m].
         weight: factor on the squared error [1/m^2].
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-        UnknownNameError: in a problem, a frame that the figure does not have.
-
     Examples:
         >>> touch = wb.Point("right_index_tip", (0.55, -0.25, 0.95))
     """
@@ -70,10 +66,6 @@ class CenterOfMass(Goal):
         weight: factor on the squared error [1/m^2].
         figure: name of the figure whose centre of mass it is; None for all figures of the scene together.
         joints: its joints; None for all of the scene.
-
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-        UnknownNameError: in a problem, a figure that the scene does not have.
 
     Examples:
         >>> lean = wb.CenterOfMass((0.05, 0.0, 0.0), axes="xy")
@@ -123,10 +115,6 @@ class Plane(Constraint):
         side: "on" keeps it in the plane, "above" lets it move to the side to which the normal points.
         height: n . p of the plane, its distance from the world's origin along the normal [m]; once resolved.
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-        UnknownNameError: in a problem, a frame that the figure does not have.
-
     Examples:
         >>> above_the_table = wb.Plane("right_wrist", (0, 0, 1), point=(0.0, 0.0, 0.8), side="above")
     """
@@ -160,6 +148,5 @@ class Plane(Constraint):
 
     def jacobian(self, state: State) -> Wrench:
         """One force along the normal."""
-        x, y, z = state.frame(self.place.frame).translation.tolist()
-        a, b, c = self.resolved_normal.tolist()
-        return Wrench(np.array(((a, b, c, y * c - z * b, z * a - x * c, x * b - y * a),)), self.place.joint)
+        forces = point_rows(state.frame(self.place.frame).translation)
+        return Wrench(self.resolved_normal[None] @ forces, self.place.joint)

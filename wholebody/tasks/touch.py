@@ -40,10 +40,6 @@ class Touch(ContactTerm):
         thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
         weight: factor on the squared distance, as a goal [1/m^2].
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-        UnknownNameError: in a problem, a name that the scene does not have.
-
     Examples:
         >>> palm_on_table = wb.Touch("right_palm", "table")
     """
@@ -89,10 +85,6 @@ class Lean(ContactTerm):
         part: the segment that leans on it.
         side: (3,) direction in the part's axes that looks at the thing; backwards if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-        UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
         >>> back = wb.tasks.Lean("wall", part="thorax")

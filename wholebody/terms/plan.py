@@ -1,9 +1,4 @@
-"""Built-in goals, constraints, bounds and measures as arrays, so that one compiled pass evaluates all of them.
-
-A plan is made for a problem and not changed, but for a lineariser's own copy, into which it writes goals that move.
-Terms of other classes are evaluated by their own methods: a plan only says in which rows they stand. `kernel` evaluates
-a plan.
-"""
+"""Built-in goals, constraints, bounds and measures as arrays, so that `kernel` evaluates all of them in one pass."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The frame loop: the figure moves towards its tracker, and its overlap is removed.
-
-Schmidl and Lin, "Real-time physically-based interaction between avatars and virtual environments", figure 3. The figure
-(with carried things) is the driven object; the things of the scene are fixed. In every frame, also at rest, the figure
-is attracted to the tracked posture as far as contact allows.
-"""
+"""The frame loop: the figure moves towards its tracker, and its overlap is removed (Schmidl and Lin, figure 3)."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""One chain: its overlapping link, and cyclic coordinate descent that moves this to a goal outside.
-
-Equations 1 to 3 of Schmidl and Lin: the end effector is the mean of the contact points on the link, and the goal is
-that point moved by the global penetration depth PD_g of the link in the obstacle. Each obstacle has its own PD_g; in a
-corner the link moves by a translation whose component along each of them is at least its length.
-"""
+"""One chain: its overlapping link, and cyclic coordinate descent that moves it out (Schmidl and Lin, eqs. 1 to 3)."""
 
 from __future__ import annotations
 

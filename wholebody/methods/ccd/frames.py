@@ -1,10 +1,7 @@
-"""Overlap resolution from frame to frame: the posture shown is as near to the tracked one as contact allows.
+"""Overlap resolution from frame to frame, towards the tracked posture as far as contact allows: docs/theory/ccd.md.
 
-Each frame moves from the last posture without overlap towards the tracked one, in steps so short that overlaps are
-shallow, and the loop of `resolver` removes the overlap of every step. So joints are attracted to the tracked ones in
-every frame, also at rest (the coach and trainee of Boulic and others 1997), limbs slide along obstacles, and the global
-penetration depth is used only where it is a good estimate. A step whose overlap cannot be removed is shortened by
-interpolation with the last posture without overlap (algorithm 1, step 4, of Schmidl and Lin).
+Joints are attracted to the tracked ones (the coach and trainee of Boulic and others 1997) by steps so short that
+overlaps are shallow; a step whose overlap remains is shortened (algorithm 1, step 4, of Schmidl and Lin).
 """
 
 from __future__ import annotations

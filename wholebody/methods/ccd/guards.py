@@ -1,8 +1,4 @@
-"""Guards: joints that have left a reach cone or a range of motion are brought back, or else stay at their last values.
-
-Cones and ranges that share joints, those of a shoulder or of a leg, are kept together. The cones are those of
-`wholebody.figures.motion_ranges`; what leaves a range is brought back by the least change of its joints.
-"""
+"""Guards bring joints back into reach cones and ranges of motion, those that share joints together."""
 
 from __future__ import annotations
 

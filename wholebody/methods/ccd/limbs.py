@@ -1,9 +1,4 @@
-"""Kinematics of some joints of a figure, as compiled loops.
-
-Cyclic coordinate descent turns one joint at a time: on vectors of three, a call into numpy costs more than all the
-arithmetic. Joints are nodes of a tree, in the model's order (a chain is a tree without branches); what lies between two
-nodes and does not move is a part of the later node's placement.
-"""
+"""Kinematics of a tree of joints of one degree of freedom each, as compiled loops."""
 
 from __future__ import annotations
 

@@ -14,15 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
-from wholebody.methods.base import (
-    CCD_TOLERANCE,
-    Iterations,
-    Restarts,
-    Seed,
-    TimeLimit,
-    UnsupportedTermError,
-    check_problem,
-)
+from wholebody.methods.base import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.terms import Request, read
@@ -77,9 +69,6 @@ class CCD(Checked, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-
     Examples:
         >>> hand = wb.load("hand")
         >>> tip = wb.Problem(wb.Scene(hand), goals=[wb.Point("right_index_tip", (0.15, 0.03, -0.02))])
@@ -87,6 +76,7 @@ class CCD(Checked, Descends):
         'ccd'
     """
 
+    name = "ccd"
     on_the_way = 1e-3  # m, rad
     tolerance: Annotated[float, CCD_TOLERANCE] = 1e-4
     iterations: Iterations = 400
@@ -94,18 +84,8 @@ class CCD(Checked, Descends):
     seed: Seed = 0
     time_limit: TimeLimit = None
 
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "ccd"
-
-    def accepts(self, problem: Problem) -> str | None:
-        """None if this method can take all terms; otherwise the sentence that names those that it cannot."""
-        try:
-            read(check_problem(problem, "CCD.accepts: problem"))
-        except UnsupportedTermError as error:
-            return str(error)
-        return None
+    def _check_terms(self, problem: Problem) -> None:
+        read(problem)
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

@@ -1,15 +1,6 @@
 """Sweeps of cyclic coordinate descent: each joint from the tip inwards takes its best value, in closed form.
 
-A point at r from a joint of unit axis u has its projection onto the joint's plane, r' = r - (u . r) u (equation 4 of
-Schmidl and Lin, with the joint's axis in both places), and so has its target t. Turned by phi, the squared distances
-of all points, weighted by w, are a constant minus 2 (A cos phi + B sin phi) with
-
-    A = sum w r' . t' = sum w (r . t - (u . r) (u . t)),        B = sum w u . (r x t),
-
-so the best rotation is phi = atan2(B, A). For one point it is the signed angle between the two projections; equation 5
-of the paper, an arc cosine, has no sign and holds for unit vectors only. Directions count like points at the origin:
-with them a frame is rotated as well as moved (Wang and Chen 1991, A Combined Optimization Method for Solving the
-Inverse Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robotics and Automation 7(4)).
+docs/theory/ccd.md has the equations (equation 4 of Schmidl and Lin; Wang and Chen 1991 for directions).
 """
 
 from __future__ import annotations

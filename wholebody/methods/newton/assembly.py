@@ -34,6 +34,7 @@ from wholebody.methods.newton.batches import Batch, EquationSet, Unit
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra import NAMES
+from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import CONTACTS, FRAMES
 from wholebody.methods.newton.system import System
 from wholebody.scene.moving_obstacles import FrameMotion
@@ -229,7 +230,7 @@ class Assembly(AssemblyJoints):
             )  # fmt: skip
             x, remark = found.x, ""
             if nearest and found.met:
-                x, _, converged = active.nearest(x, start, tolerance, iterations)
+                x, _, converged = refine(active, x, tolerance, iterations, anchor=start)
                 remark = "" if converged else "; the nearest placements were not reached: give more iterations"
             elif found.met:
                 x = active.lowered(x, tolerance)

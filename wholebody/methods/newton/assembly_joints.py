@@ -229,8 +229,7 @@ class AssemblyJoints(AssemblyBodies):
         else:
             wanted = in_a * target_placement(placement_second, what) * in_b.inverse()
         held = self._placed_joint((a, b), "fixed joint", (first, second), fixed=True)
-        held.equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
-        held.equations.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
+        held.equations.place(a, b, what, (wanted, pin.SE3.Identity()))
         return self._keep(held)
 
     def on_plane(

@@ -18,7 +18,7 @@ from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, EquationSet, Role
 from wholebody.methods.newton.feasibility import FeasibilityResult
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.measures import Objective, Refined, refine
+from wholebody.methods.newton.measures import Objective, refine
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.scene.moving_obstacles import Collision
@@ -141,13 +141,8 @@ class AssemblyGoal:
 
     def enter(self, equations: EquationSet) -> None:
         """Add the goal's equations."""
-        local, target = self.local, self.target
-        ends = np.array(local.translation), np.array(target.translation)
-        if self.kind != "orientation":
-            equations.coincide(self.index, -1, self.label, *ends, Role(weight=1.0))
-        if self.kind != "point":
-            turns = pin.Quaternion(local.rotation), pin.Quaternion(target.rotation)
-            equations.turn(self.index, -1, self.label, *turns, 3, Role(weight=1.0))
+        parts = self.kind != "orientation", self.kind != "point"
+        equations.place(self.index, -1, self.label, (self.local, self.target), Role(weight=1.0), parts)
 
 
 def to_target(target: Any, kind: Kind, where: str) -> Any:
@@ -171,9 +166,8 @@ class AssemblySystem(ActiveSystem):
         objective: Objective | None = None,
     ) -> None:
         """Take constraints and weights (7 n,); `to_scene` gives the scene's posture (nq,) at variables (7 n,)."""
-        super().__init__([*held, *(() if objective is None else objective.batches())], weight, algebra, figures)
-        self._to_scene, self.revision, self.objective = to_scene, revision, objective
-        self.own_terms = objective is not None
+        super().__init__(held, weight, algebra, figures, objective)
+        self._to_scene, self.revision, self.own_terms = to_scene, revision, objective is not None
 
     def among(self, scene: Scene, clearance: float) -> None:
         """Let the pairs of a scene of the bodies touch, at a distance of at least `clearance` metres."""
@@ -183,34 +177,13 @@ class AssemblySystem(ActiveSystem):
             data.oMi.extend([pin.SE3.Identity()] * self.workspace.model.njoints)
             self._find_contacts(np.full(len(scene.pair_table.pairs), clearance), self.workspace, data)
 
-    def arrive(self, x: Array) -> bool:
-        """Renew the contacts and the model of the measures at x; returns whether the pattern changed."""
-        x = self.retract(x)
-        if self.objective is None:
-            return super().arrive(x)
-        self.objective.renew(self._to_scene(x))
-        changed = super().arrive(x)
-        self.objective.enter(self.system)
-        return changed
+    def posture(self, x: Array) -> Array:
+        """The posture (nq,) of the scene at the variables (7 n,)."""
+        return self._to_scene(x)
 
     def lowered(self, x: Array, tolerance: float, rounds: int = REFINEMENT.rounds) -> Array:
         """The variables (7 n,) after rounds that lower the measures along the equations, which hold at x."""
-        objective = self.objective
-        if objective is None:
-            return x
-
-        def value(here: Array) -> float:
-            return objective.value(self._to_scene(here))
-
-        return refine(self, x, value, tolerance=tolerance, rounds=rounds).x
-
-    def nearest(self, x: Array, anchor: Array, tolerance: float, rounds: int) -> Refined:
-        """The place (7 n,) nearest to the anchor, from x, where the equations hold (eq. 1)."""
-
-        def value(here: Array) -> float:
-            return float(0.5 * (self._weight * (here - anchor)) @ (here - anchor))
-
-        return refine(self, x, value, tolerance=tolerance, rounds=rounds, anchor=anchor)
+        return x if self.objective is None else refine(self, x, tolerance, rounds).x
 
     def _projected(self, x: Array) -> Array:
         x = unit(x)

@@ -1,8 +1,7 @@
-"""Equations of bodies, all of one type together: residuals, Jacobians and second derivatives as arrays.
+"""Equations of bodies, all of one type together: residuals and Jacobians as arrays.
 
 A body has seven variables: its position r [m] and its Euler parameters e. Bodies are rows of an array (N + 1, 7) whose
-last row is the world, which does not move and has the index -1. Each batch has k groups of `size` equations between one
-or two bodies.
+last row is the world, with the index -1. A batch has k groups of `size` equations between one or two bodies.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from collections.abc import Hashable
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices, Mask
@@ -293,6 +293,14 @@ class EquationSet:
     def turn(self, a: int, b: int, label: str, first: Any, second: Any, size: int, role: Role = HARD) -> None:
         """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or in all axes (size 3)."""
         self._add(f"turn{size}", role, a, b, label, first.coeffs(), second.coeffs())
+
+    def place(self, a: int, b: int, label: str, ends: Any, role: Role = HARD, parts: Any = (True, True)) -> None:
+        """Two placements (pin.SE3) in two bodies coincide: in position, in all axes, or in both."""
+        first, second = ends
+        if parts[0]:
+            self.coincide(a, b, label, np.array(first.translation), np.array(second.translation), role)
+        if parts[1]:
+            self.turn(a, b, label, pin.Quaternion(first.rotation), pin.Quaternion(second.rotation), 3, role)
 
     def slide(
         self, a: int, b: int, label: str, normals: Array, place: Array, heights: ArrayLike, role: Role = HARD

@@ -1,11 +1,6 @@
 """Inequalities as equations with one slack each: squared slacks (eq. 15) or a logarithmic barrier (eqs. 13 and 14).
 
-In both cases the slack's own equation is scalar and is eliminated analytically. An inequality becomes one row with
-an entry on the diagonal,
-
-    grad phi . d + M y = -c,
-
-so that the pattern of the linear system does not change when an inequality becomes active.
+The slack is eliminated: a row ``grad phi . d + M y = -c`` stays in the pattern, whether it is active or not.
 """
 
 from __future__ import annotations
@@ -28,15 +23,10 @@ KINDS = ("slack", "barrier")
 
 
 class SquaredSlacks:
-    """phi - Y^2 = 0.
+    """phi - Y^2 = 0: where Y is zero the row is an equation; elsewhere its multiplier is zero (2 y Y = 0), and the row.
 
-    The derivative by Y is -2 Y, so Newton never moves a slack that is zero: the row is then an equation, phi = 0, and
-    stays one whatever the sign of its multiplier. So slacks at zero are tested after each linear solution: if the
-    multiplier is negative, the slack is released. A slack that the step would take through zero is set to zero; the
-    step is shortened to that point, and the remainder is solved again. Away from zero the multiplier of a slack
-    vanishes (2 y Y = 0) and so does its row. The first solution of a step that crosses no inequality releases all
-    slacks whose multipliers are negative, later ones release the most negative one. The objective of the step decreases
-    from system to system then, so no active set repeats (Nocedal and Wright 2006, "Numerical Optimization", 16.5).
+    The first solution of a step that crosses no inequality releases all slacks with negative multipliers, later ones
+    the most negative one, so no active set repeats (Nocedal and Wright 2006, "Numerical Optimization", 16.5).
     """
 
     def __init__(self, phi: Array) -> None:

@@ -1,10 +1,4 @@
-"""The Newton iteration: each step is the least motion that meets the equations to first order (eqs. 5 to 7).
-
-The previous state of the objective 1/2 |x - x0|^2 is the last iterate, so the multipliers vanish at the solution, the
-KKT matrix [D, -J'; -J, 0] is exact there, and convergence is quadratic. Steps towards distant goals aim at intermediate
-targets (B8). A step that does not reduce the errors, or moves far more than its target, is damped, which leads to least
-squares if goals conflict.
-"""
+"""The Newton iteration: each step is the least motion that meets the equations to first order (eqs. 5 to 7)."""
 
 from __future__ import annotations
 

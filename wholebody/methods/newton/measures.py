@@ -1,21 +1,8 @@
-"""The measures: rows of joint angles whose squares are minimised, and the descent of the measures themselves.
-
-A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
-angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
-measure of the revolute joints, and of a free root that one of these measures counts. A measure that says of which
-squares it is the sum, `Rhythm` or `RotationEffort`, has a row for each of them: beside a diagonal that bounds their
-second derivative the steps are many times as many. A measure that depends on other joints is only reported, and the
-solution's message names it.
-
-From a state that satisfies the equations, each round of the descent makes one step in which the motion has little
-weight against the measures, and returns to the equations by Newton steps. It is kept if the measures decreased;
-otherwise the next round is half as long. With the Jacobians alone, convergence is linear, so the steps are accelerated;
-a round whose accelerated step does not lower the measures is repeated with the step itself.
-"""
+"""The measures as rows whose squares are minimised, and the descent of the measures: docs/theory/newton.md."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +19,7 @@ from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
 from wholebody.methods.newton.own_rows import TangentRows, quadratic_model, square_rows
 from wholebody.methods.newton.settings import REFINEMENT
-from wholebody.methods.newton.system import ActiveSystem, System
+from wholebody.methods.newton.system import ActiveSystem
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
@@ -121,11 +108,10 @@ class Objective:
         self._aim(q, -0.5 * gradient / half)
         self.stiffness = REFINEMENT.stiffness * half[self._tangent]
 
-    def enter(self, system: System) -> None:
-        """Write the present factors into a system, whose residual is of the model before."""
-        squares = np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness)
-        system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
-        system.renew(system.batches)
+    @property
+    def factors(self) -> Array:
+        """(rows,) the present factors on the squares of all rows."""
+        return np.append(self.stiffness, np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness))
 
     def _aim(self, q: Array, way: Array) -> None:
         """Count from the posture q (nq,), towards displacements (nv,)."""
@@ -205,14 +191,9 @@ class Refined(NamedTuple):
 
 
 def refine(
-    active_system: ActiveSystem,
-    x: Array,
-    measure: Callable[[Array], float],
-    *,
-    tolerance: float,
-    rounds: int = REFINEMENT.rounds,
+    active_system: ActiveSystem, x: Array, tolerance: float, rounds: int = REFINEMENT.rounds,
     anchor: Array | None = None,
-) -> Refined:
+) -> Refined:  # fmt: skip
     """Lower the measures from x (7 n,), where all equations hold.
 
     With an anchor (7 n,) the measure is the squared motion from there (eq. 1), whose second derivative a step has.
@@ -222,7 +203,7 @@ def refine(
     if not run.met:
         return Refined(x, 0, False)
     run.anchor = anchor
-    descent = _Descent(run, measure, tolerance)
+    descent = _Descent(run, tolerance)
     converged = any(not descent.lower() for _ in range(rounds))
     return Refined(descent.best, len(run.residuals) - 1, converged)
 
@@ -230,9 +211,9 @@ def refine(
 class _Descent:
     """A descent of measures along the equations; `best` (7 n,) is the state with the least."""
 
-    def __init__(self, run: Iteration, measure: Callable[[Array], float], tolerance: float) -> None:
-        self._run, self._measure, self._tolerance = run, measure, tolerance
-        self.best, self._least = run.x, measure(run.x)
+    def __init__(self, run: Iteration, tolerance: float) -> None:
+        self._run, self._tolerance, self.best = run, tolerance, run.x
+        self._least = self._measured()
         self._share, self._memory, self._system = 1.0, Anderson(), run.system
         self._motion = REFINEMENT.motion if run.anchor is None else 1.0
         self._step: Array | None = None  # of the model at the best state, once it is known
@@ -289,8 +270,12 @@ class _Descent:
 
     def _measured(self) -> float:
         """The measures at the iteration's state; infinite where one of one's own is not finite there."""
+        run, active = self._run, self._run.active_system
+        if run.anchor is not None:
+            return float(0.5 * (run.system.weight * (run.x - run.anchor)) @ (run.x - run.anchor))
         try:
-            return self._measure(self._run.x)
+            value: float = active.objective.value(active.posture(run.x))
+            return value
         except UndefinedTermError as error:
-            self._run.active_system.control.step_back(error)
+            active.control.step_back(error)
             return np.inf

@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import TOLERANCE, SolvingTracker, UnsupportedTermError, check_problem
+from wholebody.methods.base import TOLERANCE, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -50,9 +50,6 @@ class Newton(Settings, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None,
             the numbers of iterations end it, and at last twenty seconds of processor time.
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-
     Examples:
         >>> wb.solve(problem, wb.methods.Newton(iterations=100)).status
         'solved'
@@ -65,15 +62,9 @@ class Newton(Settings, Descends):
         """Name for tables."""
         return f"newton/{self.algebra}"
 
-    def accepts(self, problem: Problem) -> str | None:
-        """None if all terms and joints have equations here; otherwise the sentence that names the others."""
-        check_problem(problem, "Newton.accepts: problem")
+    def _check_terms(self, problem: Problem) -> None:
         with problem.borrow() as workspace:
-            try:
-                state_equations(problem, workspace.state)
-            except UnsupportedTermError as error:
-                return str(error)
-        return None
+            state_equations(problem, workspace.state)
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

@@ -162,14 +162,9 @@ class Search:
 
     def _refined(self, found: SearchResult) -> SearchResult:
         """The same with lower measures, if possible."""
-        active_system, tolerance = self.active_system, self.settings.tolerance
-
-        def value(x: Array) -> float:
-            return active_system.objective.value(active_system.bodies.posture(x))
-
-        x, spent, _ = refine(active_system, found.reached.x, value, tolerance=tolerance)
+        x, spent, _ = refine(self.active_system, found.reached.x, self.settings.tolerance)
         self.iterations += spent
-        lower = self._judged(with_values(found.reached, x=x), found.how, active_system)
+        lower = self._judged(with_values(found.reached, x=x), found.how, self.active_system)
         return lower if self._solves(lower) and self._better(lower, found) else found
 
     def _least_violation(self, best: SearchResult, q: Array) -> SearchResult:

@@ -1,9 +1,4 @@
-"""Rows of terms that have no equations of bodies here: users' goals and constraints, and sums of squares.
-
-A term of a figure gives its derivative J with respect to the tangent displacement (nv,) of a posture. Every degree of
-freedom is a function of one or two bodies, with derivative D (nv, 7 n), so the term's rows are J D. A constraint of an
-assembly gives its derivative with respect to the bodies themselves.
-"""
+"""Rows of terms that have no equations of bodies here: users' goals and constraints, and sums of squares."""
 
 from __future__ import annotations
 

@@ -138,6 +138,7 @@ class ActiveSystem:
         path: the states (7 n,) since `begin`.
         even: whether goals count alike, whatever their weights.
         own_terms: whether there are terms of users' classes, which may not be finite everywhere.
+        objective: the `Objective` of the measures; None without any.
         structures: number of patterns that were analysed.
     """
 
@@ -151,11 +152,13 @@ class ActiveSystem:
     q = _left = np.zeros(0)
 
     def __init__(
-        self, held: Sequence[Batch], weight: Array, algebra: str, figures: Sequence[FigureBodies] = ()
-    ) -> None:
-        """Take what holds, weights (7 n,) of the variables in the least motion, and figures; goals by `begin`."""
-        self.algebra_name, self._weight = algebra, weight
-        self._held, self._figures, self._goals = list(held), tuple(figures), list[Batch]()
+        self, held: Sequence[Batch], weight: Array, algebra: str, figures: Sequence[FigureBodies] = (),
+        objective: Any = None,
+    ) -> None:  # fmt: skip
+        """Take what holds, weights (7 n,) of the variables in the least motion, figures, measures; goals by `begin`."""
+        self.algebra_name, self._weight, self.objective = algebra, weight, objective
+        self._held = [*held, *(() if objective is None else objective.batches())]
+        self._figures, self._goals = tuple(figures), list[Batch]()
         self._known: dict[Hashable, tuple[System, LinearAlgebra]] = {}
         self._laid: Hashable = None
         self._goals_laid: Hashable = None
@@ -195,11 +198,13 @@ class ActiveSystem:
     def arrive(self, x: Array) -> bool:
         """Renew the equations at x, the end of a step; returns whether their pattern changed."""
         x = self.retract(x)
+        if self.objective is not None:
+            self.objective.renew(self.posture(x))
         self._left = self.q
         fresh = not self.path
         if fresh or not np.array_equal(self.path[-1], x):
             self.path = (*self.path, x)
-        if self.contacts is None and not self._figures and not fresh:
+        if self.contacts is None and self.objective is None and not self._figures and not fresh:
             return False  # nothing depends on the state
         for figure in self._figures:
             figure.choose_limits()
@@ -213,8 +218,14 @@ class ActiveSystem:
         if changed:
             self._laid = laid
             self.system, self.algebra = self._analysed(laid, batches)
+        if self.objective is not None:
+            self.system.stiffness[self.system.objective] = self.objective.factors
         self.system.renew(batches)
         return changed
+
+    def posture(self, x: Array) -> Array:
+        """The posture (nq,) at the variables (7 n,), of which the measures are; in subclasses."""
+        return x
 
     def _projected(self, x: Array) -> Array:
         """The nearest valid state to the variables (7 n,); where pairs can touch, subclasses set `q` and the data."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody import tasks
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
@@ -19,18 +20,6 @@ from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks import (
-    Axis,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Plane,
-    Point,
-    Posture,
-    Relative,
-    StepLimit,
-)  # fmt: skip
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Goal
 from wholebody.tasks.checks import undefined
@@ -50,17 +39,17 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
     result = EquationSet()
     for number, goal in enumerate(goals):
         label, role = f"goals[{number}], {type(goal).__name__}", Role(goal.weight)
-        if isinstance(goal, Point):
+        if isinstance(goal, tasks.Point):
             point = _local(bodies, goal.place.frame).act(goal.resolved_offset)
             result.coincide(bodies.index(goal.place.joint), -1, label, point, goal.resolved_target, role)
-        elif isinstance(goal, (Frame, Orientation, Relative)):
+        elif isinstance(goal, (tasks.Frame, tasks.Orientation, tasks.Relative)):
             _placement(result, bodies, goal.residual, label, role)
-        elif isinstance(goal, Axis) and goal.toward is None:
+        elif isinstance(goal, tasks.Axis) and goal.toward is None:
             ours = axes_along(_local(bodies, goal.place.frame).rotation @ goal.basis[2])
             result.turn(bodies.index(goal.place.joint), -1, label, ours, axes_along(goal.resolved_target), 2, role)
         else:
             depends = None
-            if isinstance(goal, Posture):  # each joint on itself
+            if isinstance(goal, tasks.Posture):  # each joint on itself
                 joint = np.repeat(np.arange(bodies.model.njoints), bodies.model.nvs)
                 depends = joint[goal.dofs][:, None] == joint
             result.add(goal_rows(bodies, goal, label, depends), role)
@@ -72,9 +61,9 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     result = EquationSet()
     for number, term in enumerate(problem.constraints):
         label = f"constraints[{number}], {type(term).__name__}"
-        if isinstance(term, Hold):
+        if isinstance(term, tasks.Hold):
             _placement(result, bodies, term.residual, label)
-        elif isinstance(term, Plane):
+        elif isinstance(term, tasks.Plane):
             place, body = np.array(_local(bodies, term.place.frame).translation), bodies.index(term.place.joint)
             role = ONE_SIDED if term.side == "above" else HARD
             result.slide(-1, body, label, term.resolved_normal, place, term.height, role)
@@ -89,9 +78,9 @@ def bound_equations(problem: Problem, bodies: FigureBodies, state: State) -> Equ
     """Equations of bounds; the state is moved to the problem's start."""
     result = EquationSet()
     for number, bound in enumerate(problem.bounds):
-        if isinstance(bound, Freeze):
+        if isinstance(bound, tasks.Freeze):
             _frozen(result, bodies, bound, state.update(problem.start))
-        elif not isinstance(bound, StepLimit):  # a solve has no time step, so a step limit bounds nothing
+        elif not isinstance(bound, tasks.StepLimit):  # a solve has no time step, so a step limit bounds nothing
             raise UnsupportedTermError(
                 "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
             )
@@ -102,16 +91,12 @@ def _placement(
     equations: EquationSet, bodies: FigureBodies, residual: PlacementResidual, label: str, role: Role = HARD
 ) -> None:
     """The residual of one frame in another: a point that coincides, and axes that agree."""
-    base, local = _local(bodies, residual.base.frame), _local(bodies, residual.place.frame)
+    ends = _local(bodies, residual.base.frame) * residual.placement, _local(bodies, residual.place.frame)
     a, b = bodies.index(residual.base.joint), bodies.index(residual.place.joint)
-    if residual.position:
-        equations.coincide(a, b, label, base.act(residual.placement.translation), np.array(local.translation), role)
-    if residual.orientation:
-        wanted = pin.Quaternion(base.rotation @ residual.placement.rotation)
-        equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, role)
+    equations.place(a, b, label, ends, role, (residual.position, residual.orientation))
 
 
-def _frozen(equations: EquationSet, bodies: FigureBodies, bound: Freeze, state: State) -> None:
+def _frozen(equations: EquationSet, bodies: FigureBodies, bound: tasks.Freeze, state: State) -> None:
     """Joints that keep their placement relative to their parent at a state."""
     figure, model = bodies.figure, bodies.model
     for name in figure.joint_names(bound.joints):
@@ -119,10 +104,9 @@ def _frozen(equations: EquationSet, bodies: FigureBodies, bound: Freeze, state: 
         parent = int(model.parents[joint])
         here = state.data.oMi[parent].actInv(state.data.oMi[joint])
         a, b, label = bodies.index(parent), bodies.index(joint), f"Freeze, {name!r}"
-        if model.joints[joint].nv > 1 or not model.joints[joint].shortname().startswith("JointModelR"):
-            equations.coincide(a, b, label, np.array(here.translation), np.zeros(3))
         # of a revolute joint, whose own equations leave only this rotation, two of the three rows are redundant
-        equations.turn(a, b, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
+        moves = model.joints[joint].nv > 1 or not model.joints[joint].shortname().startswith("JointModelR")
+        equations.place(a, b, label, (here, pin.SE3.Identity()), HARD, (moves, True))
 
 
 def _local(bodies: FigureBodies, frame: int) -> Any:
@@ -133,6 +117,8 @@ def _local(bodies: FigureBodies, frame: int) -> Any:
 class FigureSystem(ActiveSystem):
     """A problem's equations, renewed from posture to posture: every iterate is a posture."""
 
+    objective: FigureObjective
+
     def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
         """Build the equations; with `yielding`, the violation of the constraints replaces the goals."""
         self.problem, self.workspace, self._yielding = problem, workspace, yielding
@@ -141,8 +127,8 @@ class FigureSystem(ActiveSystem):
         held += bound_equations(problem, bodies, workspace.state).batches()
         if not yielding:
             held += constraint_equations(problem, bodies).batches()
-        self.objective = FigureObjective(problem, bodies, workspace.state)
-        super().__init__([*held, *self.objective.batches()], bodies.weight, algebra, [bodies])
+        objective = FigureObjective(problem, bodies, workspace.state)
+        super().__init__(held, bodies.weight, algebra, [bodies], objective)
         self._find_contacts(problem.clearances, workspace, bodies.data)
         self._own = tuple(filter(is_own, problem.measures))
         self.own_terms = any(map(is_own, (*problem.goals, *problem.constraints, *problem.measures)))
@@ -184,10 +170,7 @@ class FigureSystem(ActiveSystem):
         x = self.retract(x)
         if self._own and (error := undefined(self._own, self.workspace.state.update(self.q))) is not None:
             raise error  # measures are read where a step ends, and not on the way there
-        self.objective.renew(self.q)
-        changed = super().arrive(x)
-        self.objective.enter(self.system)
-        return changed
+        return super().arrive(x)
 
     def _projected(self, x: Array) -> Array:
         x = x.copy()

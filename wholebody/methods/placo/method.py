@@ -9,12 +9,12 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
-from wholebody.methods.base import Iterations, TimeLimit, Tolerance, UnsupportedTermError, check_problem, refusal
+from wholebody.methods.base import Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError, held
 from wholebody.methods.placo.robot import SWELL, Robot
-from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
+from wholebody.methods.placo.terms import add_terms, check_terms, named_frames
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 
@@ -47,7 +47,6 @@ class Placo(Checked, Descends):
             hard tasks contradict each other or what keeps pairs apart.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         MissingPackageError: placo is not installed.
 
     Examples:
@@ -55,22 +54,15 @@ class Placo(Checked, Descends):
         True
     """
 
-    # m, rad: tolerance of the goals in frames of a motion before its end
-    on_the_way = 1e-3
+    name = "placo"
+    on_the_way = 1e-3  # m, rad
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 200
     time_limit: TimeLimit = None
     holds: Literal["hard", "soft"] = "hard"
 
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "placo"
-
-    def accepts(self, problem: Problem) -> str | None:
-        """None if placo has classes for all terms and joints; otherwise the sentence that names the others."""
-        check_problem(problem, "Placo.accepts: problem")
-        return refusal(self.name, unsupported(problem))
+    def _check_terms(self, problem: Problem) -> None:
+        check_terms(problem)
 
     def prepare(self, problem: Problem) -> None:
         """Build placo's robot for a problem; `solve` does it if this was not called."""
@@ -106,9 +98,7 @@ class _RobotCache:
 
     def robot(self, problem: Problem, workspace: Workspace, pairs: Indices) -> Robot:
         """The robot for some pairs of a problem, with the placements of things in the workspace."""
-        refused = unsupported(problem)
-        if refused:
-            raise UnsupportedTermError("placo", refused)
+        check_terms(problem)
         frames = named_frames(problem)
         if self._robot is None or not self._robot.serves(problem, frames, pairs):
             self._robot = Robot(problem.scene.figure, frames)

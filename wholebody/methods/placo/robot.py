@@ -1,8 +1,7 @@
 """placo's robot for a scene: it has a floating base, and its collision model includes the objects.
 
-placo reads robots from URDF. Here it reads a skeleton: links, the kinds and axes of joints, and a link for every frame
-that a task names. Placements, limits and inertias, which a URDF would round, and the pieces are then copied from our
-model.
+placo reads a skeleton: links, the kinds and axes of joints, and a link for every frame that a task names. Placements,
+limits and inertias, which a URDF would round, and the pieces are then copied from our model.
 """
 
 from __future__ import annotations

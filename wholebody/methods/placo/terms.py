@@ -8,26 +8,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody import tasks
 from wholebody.base.arrays import Array
-from wholebody.methods.base import named_terms
+from wholebody.methods.base import UnsupportedTermError, named_terms
 from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
-from wholebody.tasks import (
-    Axis,
-    Balance,
-    CenterOfMass,
-    Displacement,
-    Effort,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Plane,
-    Point,
-    Posture,
-    Relative,
-    StepLimit,
-)
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -56,28 +41,33 @@ class Tasks:
             task.configure(f"measure {number}", "soft", weight * share)
 
 
-def unsupported(problem: Problem) -> list[str]:
-    """Terms and joints without a class in placo, each with the reason."""
-    refused = []
+def check_terms(problem: Problem) -> None:
+    """Raise an `UnsupportedTermError` that lists terms and joints without a class in placo, each with the reason."""
+    refused = list[str]()
     for where, term in named_terms(problem):
         if not _takes(problem, term):
             kind = type(term).__name__
             refused.append(where + (f" ({REASONS[kind]})" if kind in REASONS else ""))
-    return refused + unsupported_joints(problem.scene.figure)
+    refused += unsupported_joints(problem.scene.figure)
+    if refused:
+        raise UnsupportedTermError("placo", refused)
 
 
 def _takes(problem: Problem, term: object) -> bool:
-    if isinstance(term, (Balance, CenterOfMass)):
+    if isinstance(term, (tasks.Balance, tasks.CenterOfMass)):
         return _of_all(problem, term)
-    if isinstance(term, Axis):
+    if isinstance(term, tasks.Axis):
         return term.toward is None
-    if isinstance(term, Plane):
+    if isinstance(term, tasks.Plane):
         return term.side == "on"
-    kinds = (Point, Frame, Orientation, Posture, Relative, Hold, Freeze, StepLimit, Effort, Displacement)
+    kinds = (
+        tasks.Point, tasks.Frame, tasks.Orientation, tasks.Posture, tasks.Relative, tasks.Hold, tasks.Freeze,
+        tasks.StepLimit, tasks.Effort, tasks.Displacement,
+    )  # fmt: skip
     return isinstance(term, kinds)
 
 
-def _of_all(problem: Problem, term: Balance | CenterOfMass) -> bool:
+def _of_all(problem: Problem, term: tasks.Balance | tasks.CenterOfMass) -> bool:
     """Whether a term is of the centre of mass of all that moves, not of one figure among several."""
     joints, inertias = term.joints, problem.scene.model.inertias
     return joints is None or not any(inertias[k].mass > 0.0 for k in range(1, len(inertias)) if k not in joints)
@@ -87,11 +77,11 @@ def named_frames(problem: Problem) -> Frames:
     """The frames that the tasks name: joint and placement in it."""
     found: Frames = {}
     for term in (*problem.goals, *problem.constraints):
-        if isinstance(term, Point):
+        if isinstance(term, tasks.Point):
             _add(found, problem, term.place, term.resolved_offset)
-        elif isinstance(term, (Axis, Plane)):
+        elif isinstance(term, (tasks.Axis, tasks.Plane)):
             _add(found, problem, term.place)
-        elif isinstance(term, (Frame, Orientation, Relative, Hold)):
+        elif isinstance(term, (tasks.Frame, tasks.Orientation, tasks.Relative, tasks.Hold)):
             _add(found, problem, term.residual.place)
             _add(found, problem, term.residual.base)
     return found
@@ -111,33 +101,33 @@ def _name(place: Place, offset: Array | None = None) -> str:
 
 def add_terms(solver: Any, robot: Robot, problem: Problem, holding: float) -> Tasks:
     """Add goals to placo's solver as soft tasks, constraints as hard ones, and measures; `holding`: of soft holds."""
-    tasks = Tasks()
+    own = Tasks()
     for number, goal in enumerate(problem.goals):
         _goal(solver, robot, problem, f"goal {number}", goal)
     for number, term in enumerate(problem.constraints):
-        if not isinstance(term, Balance) or _of_all(problem, term):  # others are defaults
+        if not isinstance(term, tasks.Balance) or _of_all(problem, term):  # others are defaults
             _constraint(solver, f"constraint {number}", term, holding)
     for bound in problem.bounds:
-        if isinstance(bound, Freeze):  # a solve has no time step, so a step limit bounds nothing
+        if isinstance(bound, tasks.Freeze):  # a solve has no time step, so a step limit bounds nothing
             _freeze(solver, robot, problem, bound)
     if not robot.floating:
         solver.mask_fbase(True)
     for measure in problem.measures:
-        if isinstance(measure, (Effort, Displacement)):
-            _measure(solver, robot, problem, measure, tasks)
-    return tasks
+        if isinstance(measure, (tasks.Effort, tasks.Displacement)):
+            _measure(solver, robot, problem, measure, own)
+    return own
 
 
 def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> None:
-    if isinstance(goal, Posture):
+    if isinstance(goal, tasks.Posture):
         _posture(solver, robot, problem, name, goal)
         return
-    if isinstance(goal, (Frame, Orientation, Relative)):
+    if isinstance(goal, (tasks.Frame, tasks.Orientation, tasks.Relative)):
         _placement(solver, name, goal.residual, "soft", goal.weight)
         return
-    if isinstance(goal, Point):
+    if isinstance(goal, tasks.Point):
         task = solver.add_position_task(_name(goal.place, goal.resolved_offset), np.array(goal.resolved_target))
-    elif isinstance(goal, Axis):
+    elif isinstance(goal, tasks.Axis):
         task = solver.add_axisalign_task(_name(goal.place), np.array(goal.basis[2]), np.array(goal.resolved_target))
     else:
         task = solver.add_com_task(np.array((*goal.resolved_target, 0.0)[:3]))
@@ -145,7 +135,7 @@ def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> 
     task.configure(name, "soft", goal.weight)
 
 
-def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Posture) -> None:
+def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: tasks.Posture) -> None:
     figure, dofs = problem.scene.figure, set(np.asarray(goal.dofs).tolist())
     joints = _joint_values(robot, problem, goal.resolved_target)
     values = {name: value for dof, name, value in joints if dof in dofs}
@@ -162,15 +152,15 @@ def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Postu
 
 
 def _constraint(solver: Any, name: str, term: Any, holding: float) -> None:
-    if isinstance(term, Hold):
+    if isinstance(term, tasks.Hold):
         _placement(solver, name, term.residual, "soft" if holding else "hard", holding or 1.0)
-    elif isinstance(term, Plane):
+    elif isinstance(term, tasks.Plane):
         task = solver.add_position_task(_name(term.place), term.height * np.array(term.resolved_normal))
         across = np.linalg.svd(term.resolved_normal[None])[2]  # rows: the normal, and two directions in the plane
         task.mask.R_custom_world = np.array([across[1], across[2], term.resolved_normal])
         task.mask.set_axises("z", "custom")
         task.configure(name, "hard", 1.0)
-    elif isinstance(term, Balance):
+    elif isinstance(term, tasks.Balance):
         corners = _corners(term.normals, term.offsets)
         constraint = solver.add_com_polygon_constraint(list(corners[::-1]), term.margin)
         constraint.configure(name, "hard", 1.0)
@@ -192,7 +182,7 @@ def _placement(solver: Any, name: str, residual: PlacementResidual, priority: st
     getattr(solver, f"add_{relative}{kind}_task")(*names, wanted).configure(name, priority, *weights)
 
 
-def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
+def _freeze(solver: Any, robot: Robot, problem: Problem, bound: tasks.Freeze) -> None:
     figure = problem.scene.figure
     for name in figure.joint_names(bound.joints):
         joint = figure.joint_id(name)
@@ -203,7 +193,9 @@ def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
                 solver.mask_dof(one)
 
 
-def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Displacement, tasks: Tasks) -> None:
+def _measure(
+    solver: Any, robot: Robot, problem: Problem, measure: tasks.Effort | tasks.Displacement, own: Tasks
+) -> None:
     """Weighted squared distance from a posture: a joints task for every distinct weight."""
     weights = measure.distance.weights
     groups: dict[float, dict[str, float]] = {}
@@ -213,7 +205,7 @@ def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Disp
         if weight > 0.0:
             task = solver.add_joints_task()
             task.set_joints(groups[weight])
-            tasks.measures.append((task, measure.weight * weight / float(weights.max())))
+            own.measures.append((task, measure.weight * weight / float(weights.max())))
 
 
 def _joint_values(robot: Robot, problem: Problem, q: Array) -> list[tuple[int, str, float]]:

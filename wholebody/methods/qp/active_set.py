@@ -1,10 +1,6 @@
 """From a guess to the exact answer of a quadratic program: by correcting active sets, else by semismooth Newton steps.
 
-docs/theory/qp_programs.md has the equations. With the active set fixed the program is a linear system: in the
-multipliers (Schur complement of the diagonal), or, with more rows than variables and where rows repeat each other to
-rounding, in x by QR of the weighted rows. The set is then corrected where signs are wrong (Hintermueller, Ito and
-Kunisch 2002). That may not end. Semismooth Newton steps with an exact line search do: the objective is convex,
-piecewise quadratic and smooth, and along a line its derivative is piecewise linear and increasing.
+docs/theory/qp_programs.md has the equations (Hintermueller, Ito and Kunisch 2002).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import add, dot
+from wholebody.base.dense_kernel import add, dot
 from wholebody.methods.qp.face_kernel import Face, face, minimise_on_face, stack_elastic, stack_soft
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
 from wholebody.methods.qp.settings import Corrections

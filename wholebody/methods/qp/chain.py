@@ -1,10 +1,6 @@
-"""Inverse kinematics of a chain of plain joints from many seeds, before anything else is tried.
+"""Inverse kinematics of a chain of plain joints from many seeds, before anything else is tried (TRAC-IK, 2015).
 
-Where all goals are places and rotations and the joints that carry their frames have one degree of freedom each, damped
-least squares from seeds meets the goals in tens of microseconds, and a projection leads to the least effort (TRAC-IK:
-P. Beeson, B. Ames, "TRAC-IK: An open-source library for improved solving of generic inverse kinematics", Humanoids
-2015). Seeds are the branches of the closed form of an arm that has one, else the start and random ones. An end that
-keeps every clearance is an answer; the others are rejected.
+Seeds are the branches of the closed form of an arm that has one, else the start and random ones: docs/theory/qp.md.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
+from wholebody.base.dense_kernel import copy, dot, gram, solve
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
-from wholebody.methods.qp.dense_kernel import copy, dot, gram, solve
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import residuals
 
@@ -87,7 +87,7 @@ def reach(
         # Programs for the least effort remove what is left of errors too, where they have a way to go.
         done = 1e-3 * tolerance if weighed and len(q) > len(room.value) else 0.0
         steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most)
-        left = _norm(room.value)
+        left = np.sqrt(dot(room.value, room.value))
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps
         if not left <= tolerance:
             continue
@@ -124,7 +124,7 @@ def _descend(
     before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
-        left = _norm(room.value)
+        left = np.sqrt(dot(room.value, room.value))
         if count == most or left <= done or (left <= tolerance and count and left > 0.5 * before):
             return count
         before = left
@@ -208,7 +208,7 @@ def _least_effort(
         for i in range(size):
             longest = max(longest, abs(dq[i]))
             effort += nearest[1, i] * (q[i] + dq[i] - nearest[0, i]) ** 2
-        left = _norm(room.value)
+        left = np.sqrt(dot(room.value, room.value))
         if longest < NEAR and effort > most:
             found[2] = -1.0
             return count
@@ -296,14 +296,6 @@ def _unwind(chain: Chain, q: Array, nearest: Array) -> None:
                 q[i] -= FULL
             while nearest[i] - q[i] > np.pi and q[i] + FULL <= chain.upper[i]:
                 q[i] += FULL
-
-
-@compiled(inner=True)
-def _norm(value: Array) -> float:
-    square = 0.0
-    for r in range(len(value)):
-        square += value[r] * value[r]
-    return float(np.sqrt(square))
 
 
 @compiled(error_model="numpy", fastmath={"contract", "reassoc"})

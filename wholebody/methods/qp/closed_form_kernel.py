@@ -14,7 +14,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import copy
+from wholebody.base.dense_kernel import copy
 
 CROSSING, PARALLEL, THREE_PARALLEL = range(3)
 """Axes 4 to 6 cross in o_6, and axes 1 and 2 in o_1, or axes 2 and 3 are parallel; or axes 2 to 4 are parallel, and

@@ -1,13 +1,8 @@
-"""The nearest that limbs come to goals out of reach, by Newton steps that know how bodies turn.
+"""The closest posture to goals out of reach, by Newton steps with the second derivative of the residual.
 
-A goal out of reach leaves a large residual, and Gauss-Newton steps, which neglect the residual's curvature, creep along
-a stretched limb for hundreds of iterations. Here the curvature is part of the program: with F the force that the
-weighted residual puts on a point p of a body, and w_j, v_j the angular and linear velocity that joint j gives it,
-
-    d2/dq_j dq_k (F . p) = F . (w_j x (v_k + w_k x p)),    j between the root and k,
-
-for goals and, by their multipliers, for holds (the Hessian of the Lagrangian; Nocedal and Wright 2006, section 18.1).
-Its positive part joins the program as soft rows. A dozen programs lead to a stationary point.
+With F the force that the weighted residual puts on a point p of a body, and w_j, v_j the angular and linear velocity
+that joint j gives it, it is ``d2/dq_j dq_k (F . p) = F . (w_j x (v_k + w_k x p))``, j between the root and k, for goals
+and, by their multipliers, for holds (Nocedal and Wright 2006, section 18.1). Its positive part joins as soft rows.
 """
 
 from __future__ import annotations

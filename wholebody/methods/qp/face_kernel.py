@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import add, dot, gram, least_squares, solve, sort
+from wholebody.base.dense_kernel import add, dot, gram, least_squares, solve, sort
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
 

@@ -1,8 +1,4 @@
-"""Feasibility first: from a start to a feasible posture, by whole Gauss-Newton steps in a small box, without measures.
-
-A step slides along what is in the way with all of its length; one that asks for a part of the errors and least motion,
-as in `sqp`, gets no nearer there. A joint that its limit stops is put to its other limit, where a turn leads there.
-"""
+"""Feasibility first: from a start to a feasible posture, by whole Gauss-Newton steps in a box, without measures."""
 
 from __future__ import annotations
 

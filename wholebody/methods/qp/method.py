@@ -57,7 +57,6 @@ class QP(Settings, Descends):
             the numbers of programs end it, and at last ten seconds of processor time.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         UnknownNameError: there is no such QP solver.
 
     Examples:
@@ -86,11 +85,6 @@ class QP(Settings, Descends):
         if self.hot_start:
             return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")
         return f"qp/{self.solver}" if self.solver != "active_set" else "qp/active_set, each anew"
-
-    def accepts(self, problem: Problem) -> str | None:
-        """None: every term that says its values and derivatives can be taken."""
-        check_problem(problem, "QP.accepts: problem")
-        return None
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

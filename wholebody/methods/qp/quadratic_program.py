@@ -1,14 +1,9 @@
-"""The quadratic program of one step, in a form that always has exactly one answer.
+"""The quadratic program of one step, which always has exactly one answer, and the records that it is made of.
 
     minimise    1/2 x' D x + g' x  +  1/2 sum_i w_i (t_i x - e_i)^2  +  1/2 sum_j v_j max(0, l_j - c_j x)^2
     subject to  lower <= x <= upper
 
-D is diagonal and positive. The soft rows t carry goals and equalities, the elastic rows c what must stay apart or
-within bounds. Only the box is hard, so a start in penetration, a goal out of reach or constraints that contradict
-each other are ordinary programs and none is infeasible. Large weights order the rows: what has the larger weight
-gives way last.
-
-Below stand the records that programs are made of: rows, their weights, and how far a step may go.
+The soft rows t carry goals and equalities, the elastic rows c contacts and inequalities: docs/theory/qp_programs.md.
 """
 
 from __future__ import annotations

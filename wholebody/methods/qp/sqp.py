@@ -1,8 +1,4 @@
-"""Sequential quadratic programming from one start to a local solution.
-
-Each iteration linearises, solves one quadratic program, and judges its step with a funnel (Gould and Toint 2010): far
-from the goals it must reduce the violation; near, the Lagrangian, inside the funnel. docs/theory/qp.md has the rest.
-"""
+"""Sequential quadratic programming from one start to a local solution: docs/theory/qp.md."""
 
 from __future__ import annotations
 

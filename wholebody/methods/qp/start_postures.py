@@ -1,9 +1,4 @@
-"""Start postures: on the open side of the faces that surfaces are to meet, and out of things whose normals cancel.
-
-A descent never passes through a thing: none leads from a foot under the pedal that it is to press to the contact. The
-posture just before contact, found through everything, is on the right side of all faces at once. A hand that is to
-close around a bar is found in the same way, with the bar in front of its palm.
-"""
+"""Start postures: on the open side of the faces that surfaces are to meet, and out of things whose normals cancel."""
 
 from __future__ import annotations
 

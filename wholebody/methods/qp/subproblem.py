@@ -1,8 +1,4 @@
-"""From a linearisation to the quadratic program of one step, and the two figures a step is judged by.
-
-The rows are ordered by their weights: contacts and inequalities give way last, then holds, then goals, then measures.
-Because the programs are solved exactly, the order is kept to rounding whatever the factor between the weights.
-"""
+"""From a linearisation to the quadratic program of one step, and the two figures a step is judged by."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import dot, sort
+from wholebody.base.dense_kernel import dot, sort
 from wholebody.methods.qp.quadratic_program import LinearRows, Rows, StepSize, Terms
 from wholebody.methods.qp.settings import ProgramNumbers, Weights
 

@@ -1,8 +1,4 @@
-"""A step near the goals in a normal and a tangential part, and where the tangential ones lead: docs/theory/qp.md.
-
-The measures' curvature H does not know how the constraints are curved, so the tangential parts of successive steps form
-a linear sequence, or grow where the measures curve downwards along the constraints. The normal parts have no such law.
-"""
+"""A step near the goals in a normal and a tangential part, and where the tangential ones lead: docs/theory/qp.md."""
 
 from __future__ import annotations
 

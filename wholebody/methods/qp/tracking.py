@@ -377,7 +377,7 @@ def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
         yield begun
 
 
-@with_loops("wholebody.methods.qp.dense_kernel")
+@with_loops("wholebody.base.dense_kernel")
 def compiled_kernel(dense_kernel: Any) -> None:
     """The projection, compiled or read back."""
     dense_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))

@@ -8,8 +8,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
+from wholebody.base.dense_kernel import dot
 from wholebody.methods.qp.active_set_kernel import grow
-from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.quadratic_program import (
     NUMBERS,
     ActiveSet,

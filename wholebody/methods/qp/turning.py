@@ -1,8 +1,4 @@
-"""Which steps turn some pair nearer than its rows predict: those are looked at where they end, and others are not.
-
-How much nearer a pair gets than its straight rows say is bounded for each pair by itself, from what the joints between
-the root and its two pieces do.
-"""
+"""Which steps turn some pair nearer than its rows predict: those are looked at where they end, and others are not."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import dot
+from wholebody.base.dense_kernel import dot
 from wholebody.methods.qp.quadratic_program import Bodies, Near, Rows, Seen
 
 

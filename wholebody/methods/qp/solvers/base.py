@@ -1,10 +1,4 @@
-"""What a QP solver has to do, which programs of a run it is given and in what form, and what is tried before.
-
-Programs have hundreds of elastic rows, of which a handful matters: those are solved with, all are looked at, and what
-was missed is added. Solvers that do not know our form get the split form, in which every residual is a variable of its
-own: its diagonal objective spares a factorisation of x's dense Hessian, and OSQP takes a third of the time, DAQP two
-thirds. It is scaled (docs/theory/qp_programs.md): the heaviest rows are nearly hard, as their residuals hardly count.
-"""
+"""What a QP solver has to do, which programs of a run it is given and in what form: docs/theory/qp_programs.md."""
 
 from __future__ import annotations
 

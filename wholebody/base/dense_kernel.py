@@ -57,28 +57,38 @@ def gram(scaled: Array, stacked: Array, size: int, system: Array) -> None:
 
 
 @compiled(inner=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def solve(system: Array, right: Array) -> bool:
-    """Solve a symmetric positive definite system in place by Cholesky's L L'; false where it is not one."""
-    size = len(right)
-    for i in range(size):
+def factorise(system: Array) -> bool:
+    """Write Cholesky's L into the lower triangle of L L' (n, n); false where that is not positive definite."""
+    for i in range(len(system)):
         for j in range(i + 1):
             total = system[i, j]
             for p in range(j):
                 total -= system[i, p] * system[j, p]
-            if j < i:
-                system[i, j] = total / system[j, j]
-            elif total > 0.0:
-                system[i, i] = np.sqrt(total)
-            else:
-                return False
-        total = right[i]
+            system[i, j] = total / system[j, j] if j < i else np.sqrt(total)
+        if not system[i, i] > 0.0:
+            return False
+    return True
+
+
+@compiled(inner=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def substitute(root: Array, right: Array) -> None:
+    """Solve L L' x = b in place of b (n,), with L in the lower triangle of a matrix."""
+    for i in range(len(right)):
         for p in range(i):
-            total -= system[i, p] * right[p]
-        right[i] = total / system[i, i]
-    for i in range(size - 1, -1, -1):
-        right[i] /= system[i, i]
+            right[i] -= root[i, p] * right[p]
+        right[i] /= root[i, i]
+    for i in range(len(right) - 1, -1, -1):
+        right[i] /= root[i, i]
         for p in range(i):
-            right[p] -= system[i, p] * right[i]
+            right[p] -= root[i, p] * right[i]
+
+
+@compiled(inner=True)
+def solve(system: Array, right: Array) -> bool:
+    """Solve a symmetric positive definite system in place by Cholesky's L L'; false where it is not one."""
+    if not factorise(system):
+        return False
+    substitute(system, right)
     return True
 
 
