@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor import checks, examination, packages
-from wholebody.doctor.checks import Outcome
+from wholebody.doctor import examination, packages
+from wholebody.doctor.examination import Outcome
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 
 Fake = Callable[..., None]
@@ -30,7 +30,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
             return {name: Outcome(name not in failing, failing.get(name, "fine")) for name in names}
 
         monkeypatch.setattr(packages, "installed", lambda names: everything)
-        monkeypatch.setattr(checks, "run", run)
+        monkeypatch.setattr(examination, "run", run)
 
     return arrange
 

@@ -7,9 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.view.bodies import Bodies, scene_glb
+from wholebody.view.bodies import Bodies, Skin, scene_glb
 from wholebody.view.scene_graph import Keyframe
-from wholebody.view.skin import Skin
 from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 import wholebody as wb
 from wholebody.view.browser import Browser
-from wholebody.view.goal_markers import Goals
+from wholebody.view.markers import Goals
 
 _PANEL = """(() => {
   const box = document.getElementById("panel");

@@ -1,17 +1,128 @@
-"""The whole examination: installed parts, working parts, and every fault with its repair."""
+"""The whole examination: installed parts, working parts, and every fault with its repair.
+
+A binary package of the wrong version can crash the process that imports it. So a child process tries one name after the
+other. If it crashes, the present name caused the crash, and a new child process continues with the others.
+"""
 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from importlib import import_module
+from typing import Literal, NamedTuple
 
-from wholebody.doctor import checks, packages
+from wholebody.base.runner import Child, EndedError
+from wholebody.doctor import packages
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 from wholebody.methods import EXTRAS as OF_METHODS
 from wholebody.methods import installed_methods
+
+TIMEOUT = 300.0
+"""Time limit of a check, seconds; a check takes one or two, more on a busy machine; the first compiles the loops."""
+
+
+class Outcome(NamedTuple):
+    """The outcome of a check."""
+
+    works: bool  # whether the check succeeded
+    detail: str  # the finding, or the reason of the failure, in a few words
+
+
+def solve_program(name: str) -> str:
+    """Solve ``min (x^2 + y^2) / 2 - x - y`` with ``x + y <= 1`` by a solver of qpsolvers: x = y = 1/2."""
+    import numpy as np
+    from qpsolvers import solve_qp
+    from scipy import sparse
+
+    matrix, row = sparse.eye_array(2, format="csc"), sparse.csc_array([[1.0, 1.0]])
+    if name in ("daqp", "quadprog"):
+        matrix, row = matrix.toarray(), row.toarray()
+    x = solve_qp(matrix, -np.ones(2), row, np.ones(1), lb=-np.ones(2), ub=np.ones(2), solver=name)
+    if x is None or not np.abs(x - 0.5).max() < 1e-2:
+        raise ArithmeticError(f"a program of two variables gave {x}, not [0.5, 0.5]")
+    return f"off by {np.abs(x - 0.5).max():.0e}"
+
+
+def pose_person(method: str) -> str:
+    """Reach 5 cm forward by a method."""
+    import wholebody as wb
+    from wholebody.figures.state import State
+
+    figure = wb.load("human", detail="spheres")
+    state = State(figure.model).update(figure.posture("standing"))
+    target = state.frame(figure.frame_id("right_index_tip")).translation + (0.05, 0.0, 0.0)
+    solution = wb.solve(wb.Problem(wb.Scene(figure), "standing", goals=[wb.Point("right_index_tip", target)]), method)
+    if not solution.solved:
+        raise ArithmeticError(f"a reach of 5 cm ended {solution.status}")
+    return f"{1e3 * solution.seconds:.0f} ms for a small reach"
+
+
+def use_tool(name: str) -> str:
+    """Draw an empty page with Chromium, or find ffmpeg."""
+    if name == "ffmpeg":
+        path: str | None = shutil.which(name)
+        if path is None:
+            raise FileNotFoundError("not found")
+        return str(path)
+    from wholebody.view.browser import Browser, find_chromium
+    from wholebody.view.page import static_page
+
+    path = find_chromium()
+    if path is None:
+        raise FileNotFoundError("not found")
+    with Browser((64, 64)) as browser:
+        browser.open_html(static_page([]))
+        browser.capture()
+    return path
+
+
+def look_at_cache(_: str) -> str:
+    """Say what the cache of mesh pieces holds."""
+    from wholebody.geometry.mesh_cache import LARGEST_CACHE, cache_state
+
+    state = cache_state()
+    size, most = state.size / 2**20, LARGEST_CACHE // 2**20
+    held = f"{state.entries} meshes, {size:.1f} of at most {most} MB, in {state.folder}"
+    if not state.writable:
+        raise PermissionError(f"{held}, which cannot be written: pieces of meshes are made anew each time")
+    return held
+
+
+CHECKS: dict[str, Callable[[str], str]] = {
+    "import": lambda name: str(import_module(name).__file__),
+    "program": solve_program,
+    "pose": pose_person,
+    "tool": use_tool,
+    "cache": look_at_cache,
+}
+
+
+def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, Outcome]:
+    """Try names one after the other."""
+    child, outcomes = Child(), dict[str, Outcome]()
+    try:
+        for name in names:
+            try:
+                outcomes[name] = Outcome(*child.call(attempt, kind, name, seconds=timeout))
+            except EndedError as error:
+                said = f": {error.said}" if error.said else ""
+                late = f"no answer within {timeout:.0f} s"
+                outcomes[name] = Outcome(False, late if error.overtime else f"ended the process ({error.how}){said}")
+    finally:
+        child.close()
+    return outcomes
+
+
+def attempt(kind: str, name: str) -> tuple[bool, str]:
+    """Try a name in this process: whether it works, and the finding or the reason of the failure."""
+    try:
+        return True, CHECKS[kind](name)
+    except Exception as error:  # the check reports every failure
+        return False, f"{type(error).__name__}: {error}".strip().splitlines()[0]
+
 
 State = Literal["works", "absent", "broken"]
 
@@ -67,7 +178,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
 
 
 def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
-    outcomes = checks.run("import", list(MODULES.values()))
+    outcomes = run("import", list(MODULES.values()))
     for name, module in MODULES.items():
         found, outcome = have.get(packages.normal(name)), outcomes[module]
         if found is None and not outcome.works:
@@ -91,7 +202,7 @@ def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 
 def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
     present = [name for name, package in SOLVERS.items() if package in have]
-    outcomes = checks.run("program", present)
+    outcomes = run("program", present)
     for name, package in SOLVERS.items():
         if name in outcomes:
             repair = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
@@ -102,7 +213,7 @@ def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 
 
 def _methods() -> Iterator[Entry]:
-    for name, outcome in checks.run("pose", installed_methods()).items():
+    for name, outcome in run("pose", installed_methods()).items():
         if outcome.works:
             yield Entry("method", name, "works", outcome.detail)
         else:
@@ -111,7 +222,7 @@ def _methods() -> Iterator[Entry]:
 
 
 def _tools() -> Iterator[Entry]:
-    for name, outcome in checks.run("tool", list(TOOLS)).items():
+    for name, outcome in run("tool", list(TOOLS)).items():
         use, repair = TOOLS[name]
         if outcome.works:
             yield Entry("tool", name, "works", f"{outcome.detail}, {use}", False)
@@ -122,7 +233,7 @@ def _tools() -> Iterator[Entry]:
 
 
 def _cache() -> Entry:
-    outcome = checks.run("cache", ["convex pieces"])["convex pieces"]
+    outcome = run("cache", ["convex pieces"])["convex pieces"]
     state: State = "works" if outcome.works else "absent"
     repair = "" if outcome.works else "let WHOLEBODY_CACHE name a folder that can be written"
     return Entry("cache", "convex pieces", state, outcome.detail, False, repair)

@@ -206,7 +206,6 @@ class Exertion(_HeldPerson, SumOfSquares):
         weight: factor on the measure; 10 of it beside `Effort` is as strong as a habit.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:
@@ -239,7 +238,6 @@ class StrengthLimit(_HeldPerson, ComputedTogether):
         compression: greatest of the disc L5/S1 [N]; None for no bound.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:

@@ -39,9 +39,6 @@ class FieldOfView(Checked):
         down: below it, radians.
         declination: of the normal line of sight below the head's own axis ahead, radians.
 
-    Raises:
-        InputError: a value of the wrong kind, shape or range.
-
     Examples:
         >>> narrow = wb.ergonomics.FieldOfView(horizontal=0.26)
     """
@@ -206,7 +203,6 @@ class Look(Constraint):
         place: that frame and its joint; once resolved.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
         UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:

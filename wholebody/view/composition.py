@@ -18,8 +18,7 @@ from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import commands, drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.commands import pack
-from wholebody.view.contact_markers import color_contacts, mark_blockers, mark_contacts, mark_overlaps
-from wholebody.view.goal_markers import Goals, mark_frames
+from wholebody.view.markers import Goals, color_contacts, mark_blockers, mark_contacts, mark_frames, mark_overlaps
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK, Color

@@ -23,7 +23,7 @@ from wholebody.problem import Problem
 from wholebody.view import commands
 from wholebody.view.bodies import scene_glb
 from wholebody.view.composition import Composition, panel, timed
-from wholebody.view.contact_markers import checked_overlaps
+from wholebody.view.markers import checked_overlaps
 from wholebody.view.page import live_page, notebook_frame, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots, check_movie, counted, frame_times, movie

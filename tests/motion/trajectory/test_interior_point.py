@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,8 @@ import qpsolvers
 import scipy.sparse as sp
 
 from wholebody.motion.trajectory import interior_point
-from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
 from wholebody.motion.trajectory.deviations import Objective
-from wholebody.motion.trajectory.interior_point import Answer, BandedQP
+from wholebody.motion.trajectory.interior_point import Answer, BandedQP, add_rows
 
 FRAMES, DOFS = 10, 3
 PRICE = 1e3
@@ -149,23 +147,6 @@ def test_unknowns_without_bounds_are_found() -> None:
     np.testing.assert_allclose(answer.z, [2.0, 0.5], atol=1e-5)
 
 
-def test_slacks_stay_out_of_the_band_beside_an_unknown_that_is_alone() -> None:
-    """One unknown that nothing fixes or couples, and a thousand rows that have it and a slack each."""
-    count = 1000
-    G = sp.csc_matrix(sp.hstack([np.ones((count, 1)), sp.eye(count)]))
-    P = sp.csc_matrix(sp.diags(np.full(count + 1, 1.0)))
-    c = np.concatenate([[0.0], np.full(count, PRICE)])
-    most = np.full(count + 1, np.inf)
-    most[0] = 0.5
-    tracemalloc.start()
-    answer = minimise(P, c, G, np.full(count, 0.2), np.full(count, np.inf), np.zeros(count + 1), most, None)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert answer.solved
-    assert answer.z[0] == pytest.approx(0.2, abs=1e-4)
-    assert peak < 2 * count**2  # bytes; a band of all unknowns takes four times as many
-
-
 @pytest.mark.parametrize("rows", [0, 2])
 def test_a_program_whose_objective_couples_nothing(rows: int) -> None:
     """Any unknown could be a slack then; the answer is the target, clipped."""
@@ -188,7 +169,7 @@ def test_squares_of_rows_in_a_band() -> None:
     random = np.random.default_rng(0)
     first, lengths = np.array([0, 2, 3, 5, 4]), np.array([3, 4, 1, 0, 3])
     begins = np.concatenate([[0], np.cumsum(lengths)])
-    values, weights, factors = random.normal(size=begins[-1]), random.normal(size=5), random.normal(size=5)
+    values, weights = random.normal(size=begins[-1]), random.normal(size=5)
     rows = np.zeros((5, 8))
     for k in range(5):
         rows[k, first[k] : first[k] + lengths[k]] = values[begins[k] : begins[k + 1]]
@@ -200,8 +181,3 @@ def test_squares_of_rows_in_a_band() -> None:
     band = np.zeros((8, 7))
     add_rows(band, first, begins, values, weights)
     np.testing.assert_allclose(full(band), rows.T @ np.diag(weights) @ rows, atol=1e-12)
-
-    band, shares = np.zeros((8, 7)), random.normal(size=2)
-    add_sums(band, first, begins, values, factors, np.array([0, 1, 2, 3, 4]), np.array([0, 2, 5]), shares)
-    sums = np.array([factors[:2] @ rows[:2], factors[2:] @ rows[2:]])
-    np.testing.assert_allclose(full(band), sums.T @ np.diag(shares) @ sums, atol=1e-12)

@@ -5,15 +5,16 @@
 
 With A z >= a for all bounds, slacks s = A z - a and multipliers y, Newton's equations come down to one matrix,
 
-    K = P + A' diag(y / s) A .
+    K = P + A' diag(y / s) A ,
 
-An unknown that nothing couples with others but rows, such as the slack of a missed contact, is eliminated: of its rows
-the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left is a
-band, in the order of the frames. docs/theory/trajectory.md has the reasons.
+which is a band, in the order of the frames. docs/theory/trajectory.md has the reasons.
 """
 
 from __future__ import annotations
 
+import sys
+from itertools import pairwise
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,14 +22,36 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
+from wholebody.base.compiled import compiled
 
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
 LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one that has none opposite
 
 
+@compiled(fastmath=True)
+def add_rows(band: Array, first: Indices, begins: Indices, values: Array, weights: Array) -> None:
+    """Add the sum over rows r of w_r a_r a_r' to a symmetric band matrix."""
+    # `band` (n, k): entry (j, i) is at row j + i, column j; `first` (m,) columns, `begins` (m + 1,) into `values`.
+    for row in range(len(first)):
+        begin, end = begins[row], begins[row + 1]
+        for at in range(begin, end):
+            scaled = weights[row] * values[at]
+            if scaled != 0.0:
+                column = first[row] + at - begin
+                for to in range(at, end):
+                    band[column, to - at] += scaled * values[to]
+
+
+def compiled_kernel() -> ModuleType:
+    """This module, with its loops compiled or loaded from the cache."""
+    none, places, band = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 1))
+    begins = np.zeros(1, dtype=np.intp)
+    add_rows(band, places, begins, none, none)
+    return sys.modules[__name__]
+
+
 class BandedQP(NamedTuple):
-    """A program; P (n, n) is symmetric and positive definite, with both triangles; G (m, n); both are sparse columns.
+    """A program; P (n, n) is symmetric and positive definite, with both triangles; G (m, n); both are sparse.
 
     `start` (n,) is where the iteration begins; None for the middle between bounds.
     """
@@ -97,11 +120,11 @@ def _iterated(program: BandedQP, accuracy: float, gap: float) -> Answer:
 def _without(fixed: Mask, program: BandedQP, accuracy: float, gap: float) -> Answer:
     """Solve for the unknowns that are not fixed (n,) alone; rows that have no others hold or not."""
     P, c, G, lower, upper, least, most, start = program
-    P, G, free = sp.csc_array(P), sp.csc_array(G), np.flatnonzero(~fixed)
+    P, G, free = sp.csr_array(P), sp.csr_array(G), np.flatnonzero(~fixed)
     z = np.zeros(len(fixed))
     z[fixed] = 0.5 * (least[fixed] + most[fixed])
     left = G[:, free]
-    asked = np.bincount(left.indices, minlength=len(lower)) > 0
+    asked = np.diff(left.indptr) > 0
     rows, value = np.flatnonzero(asked), G @ z
     missed = np.maximum(lower - value, value - upper)[~asked].max(initial=0.0)
     holds = bool(missed <= accuracy and (least[fixed] - most[fixed]).max() <= accuracy)
@@ -109,7 +132,7 @@ def _without(fixed: Mask, program: BandedQP, accuracy: float, gap: float) -> Ans
         return Answer(z, holds, 0)
     there = value[rows]
     others = BandedQP(
-        P[:, free][free], (c + P @ z)[free], sp.csc_array(left[rows]), lower[rows] - there, upper[rows] - there,
+        P[free][:, free], (c + P @ z)[free], left[rows], lower[rows] - there, upper[rows] - there,
         least[free], most[free], None if start is None else start[free],
     )  # fmt: skip
     found = _iterated(others, accuracy, gap)
@@ -126,12 +149,13 @@ class _Bounds:
         self.under = np.flatnonzero(np.isfinite(least))
         self.over = np.flatnonzero(np.isfinite(most))
         self.a = np.concatenate([lower[self.low], -upper[self.high], least[self.under], -most[self.over]])
-        self._ends = np.cumsum([len(self.low), len(self.high), len(self.under)])
+        ends = np.cumsum([0, len(self.low), len(self.high), len(self.under), len(self.over)])
+        self._kinds = [slice(*each) for each in pairwise(ends)]
         self._rows, self._count = len(lower), len(least)
 
     def parts(self, values: Array | Indices) -> list[Any]:
         """Values (k,) of the bounds, by their kinds."""
-        return list(np.split(values, self._ends))
+        return [values[kind] for kind in self._kinds]
 
     def times(self, Gz: Array, z: Array) -> Array:
         """(k,) A z, of z (n,) and G z (m,)."""
@@ -160,107 +184,37 @@ class _Bounds:
 
 
 class _Matrices:
-    """The matrices of a program, split into banded unknowns and slacks.
-
-    Attributes:
-        P, G, transposed: (n, n), (m, n) and (n, m) of G.
-        slack: indices of the slacks.
-        share, rows: (m, slacks) columns of G of the slacks, and the other columns.
-        sums, columns: these two transposed.
-    """
+    """The matrices P (n, n), G (m, n) and `transposed` (n, m) of a program, and K as a band of its lower triangle."""
 
     def __init__(self, program: BandedQP) -> None:
-        P, G = sp.csc_array(program.P), sp.csc_array(program.G)
+        self.P, G = sp.csr_array(program.P), sp.csr_array(program.G)
         G.eliminate_zeros()
-        self.P, self.G, self.transposed = sp.csr_array(P), sp.csr_array(G), sp.csr_array(G.T)
-        slack = _slacks(P, G, np.isinf(program.most))
-        self.slack: Indices = np.flatnonzero(slack).astype(np.intp)
-        self.band: Indices = np.flatnonzero(~slack).astype(np.intp)
-        self.share = sp.csc_array(G[:, self.slack])
-        self.rows = sp.csr_array(G[:, self.band])
-        self.rows.sort_indices()
-        self.columns, self.sums = sp.csr_array(self.rows.T), sp.csr_array(self.share.T)
-        self._own = P.diagonal()[self.slack]
-        self._spans()
-        self._groups()
-        inner = sp.coo_array(P[self.band][:, self.band])
+        G.sort_indices()
+        self.G, self.transposed = G, sp.csr_array(G.T)
+        # each row from its first to its last entry, zeros between them included
+        some = np.flatnonzero(np.diff(G.indptr))
+        self._first, lengths = np.zeros((2, G.shape[0]), dtype=np.intp)
+        self._first[some] = G.indices[G.indptr[some]]
+        lengths[some] = G.indices[G.indptr[some + 1] - 1] - self._first[some] + 1
+        self._begins = np.concatenate([[0], np.cumsum(lengths)]).astype(np.intp)
+        self._values = np.zeros(self._begins[-1])
+        row = np.repeat(np.arange(G.shape[0]), np.diff(G.indptr))
+        self._values[self._begins[row] + G.indices - self._first[row]] = G.data
+        inner = sp.coo_array(self.P)
         at, to = inner.coords
-        width = max(int((at - to).max(initial=0)), self._widest) + 1
-        self._base = np.zeros((len(self.band), width))
+        width = max(int((at - to).max(initial=0)) + 1, int(lengths.max(initial=1)))
+        self._base = np.zeros((len(program.c), width))
         self._base[to[at >= to], (at - to)[at >= to]] = inner.data[at >= to]
         self._K = np.empty_like(self._base)  # one for all iterations: fresh memory of this size costs time
 
-    def factor(self, rows: Array, unknowns: Array) -> _Factor | None:
-        """Of K, with weights (m,) of rows and (n,) of unknowns, in the last one's memory; None where singular."""
-        own = self._own + unknowns[self.slack]
-        shared = self._squares @ rows
-        weights = rows.copy()
-        single = self._single
-        weights[self._alone] *= own[single] / (own[single] + shared[single])
+    def factor(self, rows: Array, unknowns: Array) -> Array | None:
+        """Cholesky's of K with weights (m,) of rows and (n,) of unknowns, until the next one; None where singular."""
         K = self._K
         K[:] = self._base
-        K[:, 0] += unknowns[self.band]
-        add_rows(K, self._first, self._begins, self._values, weights)
-        if len(self._begun) > 1:
-            total = (own + shared)[self._several]
-            add_sums(
-                K, self._first, self._begins, self._values, rows * self._factors, self._members, self._begun,
-                -1.0 / total,
-            )  # fmt: skip
+        K[:, 0] += unknowns
+        add_rows(K, self._first, self._begins, self._values, rows)
         cholesky, failed = lapack.dpbtrf(K.T, lower=1, overwrite_ab=1)
-        return None if failed else _Factor(self, cholesky, rows, own + shared)
-
-    def _spans(self) -> None:
-        """Each row from its first to its last entry, zeros between them included."""
-        rows = self.rows
-        some = np.flatnonzero(np.diff(rows.indptr))
-        self._first = np.zeros(rows.shape[0], dtype=np.intp)
-        lengths = np.zeros(rows.shape[0], dtype=np.intp)
-        self._first[some] = rows.indices[rows.indptr[some]]
-        lengths[some] = rows.indices[rows.indptr[some + 1] - 1] - self._first[some] + 1
-        self._begins = np.concatenate([[0], np.cumsum(lengths)]).astype(np.intp)
-        self._values = np.zeros(self._begins[-1])
-        row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
-        self._values[self._begins[row] + rows.indices - self._first[row]] = rows.data
-        self._widest = int(lengths.max(initial=1)) - 1
-
-    def _groups(self) -> None:
-        share = self.share
-        many = np.diff(share.indptr)
-        self._squares = sp.csr_array(share.power(2).T)
-        self._factors = np.zeros(share.shape[0])
-        self._factors[share.indices] = share.data
-        self._single, self._several = np.flatnonzero(many == 1), np.flatnonzero(many > 1)
-        self._alone = share.indices[share.indptr[self._single]]
-        parts = [share.indices[share.indptr[k] : share.indptr[k + 1]] for k in self._several]
-        self._members = np.concatenate([np.zeros(0, dtype=np.intp), *parts]).astype(np.intp)
-        self._begun = np.concatenate([[0], np.cumsum(many[self._several])]).astype(np.intp)
-        if len(self._several):
-            lengths = np.diff(self._begins)[self._members]
-            first = np.where(lengths > 0, self._first[self._members], len(self.band))
-            last = np.where(lengths > 0, self._first[self._members] + lengths, 0)
-            spans = np.maximum.reduceat(last, self._begun[:-1]) - np.minimum.reduceat(first, self._begun[:-1])
-            self._widest = max(self._widest, int(spans.max()) - 1)
-
-
-class _Factor(NamedTuple):
-    """K as its Cholesky factor, and what eliminates the slacks."""
-
-    matrices: _Matrices
-    cholesky: Array
-    weights: Array
-    slack: Array
-
-    def solve(self, right: Array) -> Array:
-        """(n,) the solution of K z = right (n,), slacks included."""
-        matrices = self.matrices
-        found = np.zeros(len(right))
-        own = right[matrices.slack]
-        rest = right[matrices.band] - matrices.columns @ (self.weights * (matrices.share @ (own / self.slack)))
-        inner, _ = lapack.dpbtrs(self.cholesky, rest, lower=1)
-        found[matrices.band] = inner
-        found[matrices.slack] = (own - matrices.sums @ (self.weights * (matrices.rows @ inner))) / self.slack
-        return found
+        return None if failed else cholesky
 
 
 class _Newton(NamedTuple):
@@ -268,7 +222,7 @@ class _Newton(NamedTuple):
 
     matrices: _Matrices
     bounds: _Bounds
-    factor: _Factor
+    factor: Array
     derivative: Array
     missed: Array
     s: Array
@@ -278,28 +232,27 @@ class _Newton(NamedTuple):
         """Changes of z, A z, s and y that take away these products (k,) of slacks and multipliers, to first order."""
         matrices, bounds, s, y = self.matrices, self.bounds, self.s, self.y
         pull = -self.derivative - bounds.transposed(matrices.transposed, (products + y * self.missed) / s)
-        dz = self.factor.solve(pull)
+        dz, _ = lapack.dpbtrs(self.factor, pull, lower=1)
         change = bounds.times(matrices.G @ dz, dz)
         ds = change + self.missed
         return dz, change, ds, -(products + y * ds) / s
 
 
-def _slacks(P: Any, G: Any, unbounded: Mask) -> Mask:
-    """(n,) unknowns, unbounded above, that P does not couple with others, of each row the last."""
-    alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0) & unbounded
-    found = np.flatnonzero(alone)
-    shares = sp.coo_array(G[:, found])
-    row, column = shares.coords
-    last = np.full(shares.shape[0], -1)
+def _slacks(P: Any, G: Any, unbounded: Mask) -> Indices:
+    """The unknowns, unbounded above, that P does not couple with others, of each row the last."""
+    alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & unbounded
+    found = np.flatnonzero(alone & (np.bincount(G.indices, minlength=G.shape[1]) > 0))
+    row, column = sp.coo_array(G[:, found]).coords
+    last = np.full(G.shape[0], -1)
     np.maximum.at(last, row, column)
-    alone[found[column[column < last[row]]]] = False
-    return alone
+    return np.delete(found, np.unique(column[column < last[row]])).astype(np.intp)
 
 
 def _begun(matrices: _Matrices, bounds: _Bounds, program: BandedQP) -> tuple[Array, Array, Array]:
-    """Unknowns (n,), slacks (k,) and multipliers (k,) to begin with."""
+    """Unknowns (n,), slacks (k,) and multipliers (k,) to begin with; slacks of rows are as large as they miss them."""
     c, least, most, start = program.c, program.least, program.most, program.start
-    both, slack = np.isfinite(least) & np.isfinite(most), matrices.slack
+    slack = _slacks(matrices.P, matrices.G, np.isinf(most))
+    share, both = sp.csc_array(matrices.G[:, slack]), np.isfinite(least) & np.isfinite(most)
     middle = np.clip(0.0, least, most)
     middle[both] = 0.5 * (least[both] + most[both])
     z = middle if start is None else start.copy()
@@ -311,7 +264,6 @@ def _begun(matrices: _Matrices, bounds: _Bounds, program: BandedQP) -> tuple[Arr
     if len(slack):
         z[slack] = np.where(np.isfinite(least[slack]), least[slack], 0.0)
     away = bounds.times(matrices.G @ z, z) - bounds.a
-    share = matrices.share
     if len(slack):
         short = np.zeros(len(largest))
         short[bounds.low] = np.maximum(-bounds.parts(away)[0], 0.0)

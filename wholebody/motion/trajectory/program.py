@@ -125,7 +125,7 @@ def lay_out(objective: Objective, limits: Limits, step: Step) -> Layout:
     begun = np.zeros(size)
     begun[place] = step.x[:, step.dofs]
     program = BandedQP(
-        P, c, sp.csc_matrix(sp.vstack([G, D])), np.concatenate([lower, slowest]),
+        P, c, sp.vstack([G, D], format="csr"), np.concatenate([lower, slowest]),
         np.concatenate([np.full(len(lower), np.inf), fastest]), least, most, begun,
     )  # fmt: skip
     return Layout(program, place, step.dofs)
@@ -191,7 +191,7 @@ def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
     return slack, len(own) + int((~missed).any())
 
 
-def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tuple[sp.csc_matrix, Array]:
+def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tuple[sp.csr_matrix, Array]:
     """P and c: the objective, the prices of slacks, and the augmented Lagrangian of equalities."""
     x, dofs, count = step.x, step.dofs, len(step.dofs)
     stiffness = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
@@ -213,10 +213,10 @@ def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tu
             to.append(np.tile(here, count))
             c[here] -= stiffness * part.T @ wanted
     triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
-    return sp.csc_matrix(triplets, shape=(len(c), len(c))), c
+    return sp.csr_matrix(triplets, shape=(len(c), len(c))), c
 
 
-def _contact_part(step: Step, columns: Sequence[Indices], place: Indices, size: int) -> tuple[sp.csc_matrix, Array]:
+def _contact_part(step: Step, columns: Sequence[Indices], place: Indices, size: int) -> tuple[sp.csr_matrix, Array]:
     """Rows ``gap + J (y - x) + slack >= 0``; `columns` has the slack of each row that is kept."""
     x, dofs, count = step.x, step.dofs, len(step.dofs)
     values, at, to, lower = [np.zeros(0)], [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
@@ -237,10 +237,10 @@ def _contact_part(step: Step, columns: Sequence[Indices], place: Indices, size: 
         lower.append(bound)
         number += many
     triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
-    return sp.csc_matrix(triplets, shape=(number, size)), np.concatenate(lower)
+    return sp.csr_matrix(triplets, shape=(number, size)), np.concatenate(lower)
 
 
-def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[sp.csc_matrix, Array, Array]:
+def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[sp.csr_matrix, Array, Array]:
     """Rows that bound the change of a deviation from a frame to the next, where it is near the bound."""
     x = step.x[:, step.dofs]
     change = np.diff(x, axis=0)
@@ -256,7 +256,7 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
     index = np.arange(len(frame))
     values = np.concatenate([np.ones(len(index)), -np.ones(len(index))])
     columns = np.concatenate([place[frame + 1, dof], place[frame, dof]])
-    return sp.csc_matrix((values, (np.tile(index, 2), columns)), shape=(len(index), size)), low, high
+    return sp.csr_matrix((values, (np.tile(index, 2), columns)), shape=(len(index), size)), low, high
 
 
 def _brought_back(x: Array, past: Array, radius: float) -> Array:

@@ -39,10 +39,10 @@ def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = Non
     least = 1.0 / stretch**2
     if loads is None and (most >= 1.0).all():
         return np.ones(count)
-    bands = sp.csc_matrix(Objective(count, np.ones(1), SPREAD, dt, (False, False)).bands)
+    bands = sp.csr_matrix(Objective(count, np.ones(1), SPREAD, dt, (False, False)).bands)
     low, high = np.zeros(count), np.full(count, 1.0 - least)
     low = np.clip(1.0 - most, 0.0, high)  # unknowns are 1 - b
-    P, c, G, lower = bands, np.zeros(count), sp.csc_matrix((0, count)), np.zeros(0)
+    P, c, G, lower = bands, np.zeros(count), sp.csr_matrix((0, count)), np.zeros(0)
     if loads is not None and len(loads.gap):
         rate = _rate(count, dt)[loads.frame]
         rows = sp.diags(loads.speed) @ sp.eye(count, format="csr")[loads.frame] + sp.diags(loads.change) @ rate
@@ -55,7 +55,7 @@ def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = Non
         G, lower = sp.hstack([-rows, sp.eye(slacks)]), -ahead
         low, high = np.concatenate([low, np.zeros(slacks)]), np.concatenate([high, np.full(slacks, np.inf)])
     program = BandedQP(
-        sp.csc_matrix(P), c, sp.csc_matrix(G), lower, np.full(len(lower), np.inf), low, high
+        sp.csr_matrix(P), c, sp.csr_matrix(G), lower, np.full(len(lower), np.inf), low, high
     )  # fmt: skip
     z = minimise(program).z[:count]
     found: Array = 1.0 - np.clip(z, low[:count], high[:count])
