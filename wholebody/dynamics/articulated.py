@@ -15,7 +15,7 @@ the velocities beside that are scaled so that energy is conserved where nothing 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -62,6 +62,8 @@ class Articulated:
         self._model.gravity.linear = self._gravity
         self._data, self._workspace = self._model.createData(), scene.workspace()
         self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
+        owners = np.array(self._workspace.owners)
+        self._pieces = {name: np.flatnonzero(owners == name) for name in scene.objects}
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._surfaces = self.q, dict[tuple[str, str], Surface]()
@@ -206,9 +208,10 @@ class Articulated:
         workspace, engine, model = self._workspace, self._engine, self._model
         names = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
         workspace.place({**names, **{name: way[0] for name, way in moved.items()}})
-        twists = [] if engine is None else [engine.twist(name) for name in names]
-        speed = max(float(np.abs(one).max(initial=0.0)) for one in [self.velocity, *twists])
-        near = workspace.near(self.q, 2e-3 + min(0.2, 1.5 * time * speed))  # m
+        speed = self._approach(names, moved, time)
+        # m: what is hit in this step can be faster after it
+        most = 2e-3 + np.minimum(0.2, time * (1.5 * speed + 0.5 * min(float(speed.max(initial=0.0)), 10.0)))
+        near = workspace.near(self.q, float(most.max(initial=0.0)), most)
         rows = self._rows.rows(near)
         kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
         contact, wrench = rows.contact[kept], rows.wrench[kept]
@@ -236,6 +239,24 @@ class Articulated:
             made.figure[3 * c, freedom], made.gap[c] = sign, room
         self.points = count
         return made
+
+    def _approach(self, bodies: Collection[str], moved: Moved, time: float) -> Array:
+        """Bounds (pairs,) of the speeds at which the pieces of pairs approach each other, m/s."""
+        workspace, engine = self._workspace, self._engine
+        table, state = workspace.table, workspace.state.update(self.q)
+        twist = ((state.support * state.spread(self.velocity)) @ state.columns)[table.joint]
+        for name in bodies if engine is not None else ():
+            velocity = engine.twist(name)
+            velocity[:3] -= cross(velocity[3:], engine.centre(name))
+            twist[self._pieces[name]] = velocity
+        for name, (before, after) in moved.items():
+            twist[self._pieces[name]] = pin.log6(after * before.inverse()).vector / time
+        first, second = table.pairs.T
+        lesser = np.where(table.reach[first] < table.reach[second], first, second)
+        relative, centre = twist[first] - twist[second], workspace.proximity.place(state.data)[lesser, 3]
+        linear = np.linalg.norm(relative[:, :3] + cross(relative[:, 3:], centre), axis=1)
+        reach = np.where(np.isinf(table.reach[lesser]), 0.0, table.reach[lesser])
+        return np.asarray(linear + np.linalg.norm(relative[:, 3:], axis=1) * reach)
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
