@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled, with_loops
@@ -245,6 +246,12 @@ def violation(mobility: Array, velocity: Array, friction: Array, target: Array, 
             off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
             worst = max(worst, off * side)
     return worst
+
+
+def by_inertia(inertia: Array, momentum: Array) -> Array:
+    """The velocities (n,) that an inertia (n, n), symmetric, has with a momentum (n,)."""
+    velocity, failed = lapack.dposv(inertia, momentum)[1:]
+    return np.asarray(np.linalg.solve(inertia, momentum) if failed else velocity)
 
 
 def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> tuple[Array, Array]:
