@@ -23,7 +23,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel
-from wholebody.dynamics.coupling import Actuated, Moved, Points, axes_of, near_limits
+from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, near_limits, share_below
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.pieces import places, surface_of
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
@@ -62,10 +62,13 @@ class Articulated:
         self._model.gravity.linear = self._gravity
         self._data, self._workspace = self._model.createData(), scene.workspace()
         self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
+        owners = np.array(self._workspace.owners)
+        self._pieces = {name: np.flatnonzero(owners == name) for name in scene.objects}
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._surfaces = self.q, dict[tuple[str, str], Surface]()
-        light = self._inertia(self.q).diagonal() < 1e-5  # kg m2: of links without mass
+        self._asked, self._masses = b"", np.zeros((0, 0))
+        light = pin.crba(self._model, self._data, self.q).diagonal() < 1e-5  # kg m2: of links without mass
         self._model.armature += np.where(light, 1e-5, 0.0)
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
         free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
@@ -92,8 +95,11 @@ class Articulated:
 
     def energy(self) -> float:
         """Kinetic and potential energy, joules."""
-        kinetic = 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity)
-        return kinetic + float(pin.computePotentialEnergy(self._model, self._data, self.q))
+        return 0.5 * float(self.velocity @ self._inertia(self.q) @ self.velocity) + self._potential()
+
+    def _potential(self) -> float:
+        pin.centerOfMass(self._model, self._data, self.q, False)
+        return -float(self._data.mass[0] * (self._gravity @ self._data.com[0]))
 
     def momentum(self) -> Array:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,)."""
@@ -102,8 +108,10 @@ class Articulated:
         return np.concatenate([linear, centroidal.angular + cross(self._data.com[0], linear)])
 
     def _inertia(self, q: Array) -> Array:
-        upper = np.triu(pin.crba(self._model, self._data, q))
-        return np.asarray(upper + upper.T - np.diag(upper.diagonal()))
+        """The inertia (nv, nv) of the joints at a posture (nq,): the last one again where that is the same."""
+        if (asked := q.tobytes()) != self._asked:
+            self._asked, self._masses = asked, np.array(pin.crba(self._model, self._data, q))
+        return self._masses
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much.
@@ -143,12 +151,17 @@ class Articulated:
             masses, borne = self._inertia(middle), np.where(self.stiffness > 0.0, weight, 0.0)
             driven = masses + np.diag(soft)
             rest = masses @ begin + time * (self.stiffness * apart - forces + borne) + soft * steady
-            self.velocity = np.linalg.solve(driven, rest)
+            self.velocity = impulse_kernel.by_inertia(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
         bearing, parting = self._bear(driven, points, time)
         impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
-        drifted = self._drifted(masses_begun @ start + points.figure.T @ impulse.ravel(), time, pressed)
+        pin.centerOfMass(model, self._data, self.q)
+        momentum = masses_begun @ start + points.figure.T @ impulse.ravel()
+        drifted = [
+            drift(self._data, root, momentum[model.idx_vs[root] :][:6], self._gravity, time, pressed)
+            for root in self._roots
+        ]
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | pressed, after, mean)
@@ -189,13 +202,8 @@ class Articulated:
                 engine.push(other, -share * impulse, point)
             return engine.energy()
 
-        none, half, full = engine.energy(), taken_back(0.5), taken_back(0.5)
-        square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
-        share = 1.0
-        if full > most and square > 0.0:
-            first = square + none - full
-            root = np.sqrt(max(0.0, first**2 - 4.0 * square * (none - most)))
-            share = min(max(0.5 * (first + root) / square, 0.0), 1.0)
+        share = share_below((engine.energy(), taken_back(0.5), taken_back(0.5)), most)
+        if share < 1.0:
             taken_back(share - 1.0)
         for own, _, impulse, point in blows:
             wrenches[own] = wrenches[own] + share * np.hstack([impulse, cross(point, impulse)])
@@ -206,9 +214,10 @@ class Articulated:
         workspace, engine, model = self._workspace, self._engine, self._model
         names = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
         workspace.place({**names, **{name: way[0] for name, way in moved.items()}})
-        twists = [] if engine is None else [engine.twist(name) for name in names]
-        speed = max(float(np.abs(one).max(initial=0.0)) for one in [self.velocity, *twists])
-        near = workspace.near(self.q, 2e-3 + min(0.2, 1.5 * time * speed))  # m
+        speed = self._approach(names, moved, time)
+        # m: what is hit in this step can be faster after it
+        most = 2e-3 + np.minimum(0.2, time * (1.5 * speed + 0.5 * min(float(speed.max(initial=0.0)), 10.0)))
+        near = workspace.near(self.q, float(most.max(initial=0.0)), most)
         rows = self._rows.rows(near)
         kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
         contact, wrench = rows.contact[kept], rows.wrench[kept]
@@ -236,6 +245,19 @@ class Articulated:
             made.figure[3 * c, freedom], made.gap[c] = sign, room
         self.points = count
         return made
+
+    def _approach(self, bodies: Mapping[str, pin.SE3], moved: Moved, time: float) -> Array:
+        """How fast the pieces of every pair can approach each other (pairs,), m/s; see `approaches`."""
+        workspace, engine = self._workspace, self._engine
+        state = workspace.state.update(self.q)
+        twist = ((state.support * state.spread(self.velocity)) @ state.columns)[workspace.table.joint]
+        if engine is not None:
+            for name in bodies:
+                velocity = engine.velocity_at(name, np.zeros(3))
+                twist[self._pieces[name]] = *velocity, *engine.twist(name)[3:]
+        for name, (before, after) in moved.items():
+            twist[self._pieces[name]] = pin.log6(after * before.inverse()).vector / time
+        return approaches(workspace.table, workspace.proximity.place(state.data)[:, 3], twist)
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
@@ -296,10 +318,11 @@ class Articulated:
             found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
             after = begun + mobility @ found.ravel()
         impulse[kept] = found
-        self.velocity = self.velocity + np.linalg.solve(inertia, figure.T @ found.ravel())
+        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, figure.T @ found.ravel())
+        pushed = set(np.flatnonzero(impulse.any(axis=1)).tolist())
         for name, c, place, axes in points.pushes:
-            push = impulse[c] @ axes
-            if push.any():
+            if c in pushed:
+                push = impulse[c] @ axes
                 self._engine.push(name, push, place)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
         velocities = speed.copy()
@@ -314,13 +337,13 @@ class Articulated:
         Nothing rises beyond a potential energy [J]: what lies still is not parted from what it overlaps.
         """
         model, data, before = self._model, self._data, self._placements(segments)
-        start, lowest = self.q, float(pin.computePotentialEnergy(model, data, self.q))
+        start, lowest = self.q, self._potential()
         self.q = np.array(pin.integrate(model, start, way))
         pin.centerOfMass(model, data, self.q)
         for root, (_, centre) in zip(self._roots, drifted, strict=True):
             first, seat = model.idx_qs[root], model.jointPlacements[root].rotation
             self.q[first : first + 3] += seat.T @ (centre - data.oMi[root].act(data.com[root]))
-        rise, most = float(pin.computePotentialEnergy(model, data, self.q)) - lowest, max(0.0, energy - lowest)
+        rise, most = self._potential() - lowest, max(0.0, energy - lowest)
         if rise > most:  # of so little, the rise is nearly proportional to the way
             part = 0.99 * most / rise * pin.difference(model, start, self.q)
             self.q = np.array(pin.integrate(model, start, part))
@@ -330,25 +353,6 @@ class Articulated:
     def _placements(self, segments: Mapping[str, int]) -> dict[str, pin.SE3]:
         state = self._workspace.state.update(self.q)
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
-
-    def _drifted(self, momentum: Array, time: float, borne: bool) -> list[tuple[pin.Force, Array]]:
-        """Momenta about the origin and centres (3,) of what free roots carry, a time after the momenta (nv,).
-
-        Centres move by the mean of the velocities before and after, in a step with contacts (`borne`) by that after,
-        as the joints do. The weight acts where that keeps the angular momentum of a centre on its way.
-        """
-        model, data, found = self._model, self._data, list[tuple[pin.Force, Array]]()
-        pin.centerOfMass(model, data, self.q)
-        share = 1.0 if borne else 0.5
-        for root in self._roots:
-            first, place = model.idx_vs[root], data.oMi[root]
-            now = place.act(pin.Force(momentum[first : first + 6]))
-            mass, centre = data.mass[root], place.act(data.com[root])
-            weight = time * mass * self._gravity
-            way = time / mass * (now.linear + share * weight)
-            then = now + pin.Force(weight, cross(centre + (1.0 - share) * way, weight))
-            found.append((then, centre + way))
-        return found
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
         """Give free roots their momenta, and scale the velocities beside those by at most a factor.
@@ -361,12 +365,12 @@ class Articulated:
         if len(roots):
             kept = [self._data.oMi[k].actInv(one).vector for k, one in zip(self._roots, momenta, strict=True)]
             locked = masses[np.ix_(roots, roots)]
-            drift[roots] = np.linalg.solve(locked, np.concatenate(kept))
+            drift[roots] = impulse_kernel.by_inertia(locked, np.concatenate(kept))
             velocity = velocity.copy()
             velocity[roots] = 0.0
-            velocity[roots] = -np.linalg.solve(locked, masses[roots] @ velocity)
+            velocity[roots] = -impulse_kernel.by_inertia(locked, masses[roots] @ velocity)
         kinetic = [0.5 * float(part @ masses @ part) for part in (drift, velocity)]
-        left = energy - float(pin.computePotentialEnergy(self._model, self._data, self.q))
+        left = energy - self._potential()
         if kinetic[1] > 0.0:
             velocity = velocity * min(most, np.sqrt(max(0.0, (left - kinetic[0]) / kinetic[1])))
         if kinetic[0] > max(0.0, left):
@@ -390,7 +394,7 @@ class Articulated:
                 total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrench
                 before, after = moved[name]
                 energy += float(wrench @ pin.log6(after * before.inverse()).vector) / time
-        self.velocity = self.velocity + np.linalg.solve(inertia, total)
+        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, total)
         pushed, first = inertia @ self.velocity, model.idx_vs
         momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
         self._settle(energy, 1.0, momenta)

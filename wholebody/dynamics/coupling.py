@@ -31,6 +31,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.geometry.pieces import ENDLESS
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
 
@@ -296,9 +297,8 @@ class Points(NamedTuple):
                     continue
                 here, axes, self.driven[c] = slice(3 * c, 3 * c + 3), directions[c, :, :3], True
                 if owner in places and engine is not None:
-                    b = places[owner]
-                    lever = place[c] - engine.centre(owner)
-                    self.things[here, b : b + 6] += sign * np.hstack([axes, axes @ pin.skew(lever).T])
+                    b, turned = places[owner], directions[c, :, 3:] - cross(engine.centre(owner), axes)
+                    self.things[here, b : b + 3], self.things[here, b + 3 : b + 6] = sign * axes, sign * turned
                     self.pushes.append((owner, c, place[c], sign * axes))
                 if owner in moved:
                     before, after = moved[owner]
@@ -328,3 +328,51 @@ def near_limits(
     gaps = q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]
     near = [gap < 0.02 + 1.5 * time * np.abs(velocity[freedom]) for gap in gaps]  # rad, m
     return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
+
+
+def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
+    """Bounds (pairs,) of the speeds at which the pieces of pairs approach each other, m/s.
+
+    That of a point of the smaller piece, seen from the other: of its centre, and by rotation about that.
+
+    Args:
+        table: pieces and pairs.
+        centres: (n, 3) of the pieces, metres.
+        twist: (n, 6) of the pieces at the world's origin, m/s and rad/s.
+    """
+    first, second = table.pairs.T
+    smaller = np.where(table.reach[first] < table.reach[second], first, second)
+    relative = twist[first] - twist[second]
+    linear, spin = relative[:, :3] + cross(relative[:, 3:], centres[smaller]), relative[:, 3:]
+    reach = np.minimum(table.reach[smaller], ENDLESS)
+    return np.asarray(np.sqrt((linear**2).sum(axis=1)) + reach * np.sqrt((spin**2).sum(axis=1)))
+
+
+def drift(
+    data: pin.Data, root: int, momentum: Array, gravity: Array, time: float, borne: bool
+) -> tuple[pin.Force, Array]:
+    """Momentum about the origin and centre (3,) of what a free root carries, a time after its momentum (6,).
+
+    The centre moves by the mean of the velocities before and after, in a step with contacts (`borne`) by that after,
+    as the joints do. The weight acts where that keeps the angular momentum of a centre on its way.
+    """
+    place, share = data.oMi[root], 1.0 if borne else 0.5
+    now = place.act(pin.Force(momentum))
+    mass, centre = data.mass[root], place.act(data.com[root])
+    weight = time * mass * gravity
+    way = time / mass * (now.linear + share * weight)
+    return now + pin.Force(weight, cross(centre + (1.0 - share) * way, weight)), centre + way
+
+
+def share_below(energies: tuple[float, float, float], most: float) -> float:
+    """The largest share from 0 to 1 of an impulse with which an energy is at most `most`, J.
+
+    The energy is quadratic in the share; `energies` are those with none, half and all of it.
+    """
+    none, half, full = energies
+    square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
+    if full <= most or square <= 0.0:
+        return 1.0
+    first = square + none - full
+    root = np.sqrt(max(0.0, first**2 - 4.0 * square * (none - most)))
+    return float(min(max(0.5 * (first + root) / square, 0.0), 1.0))

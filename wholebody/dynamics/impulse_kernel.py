@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.linalg import lapack
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled, with_loops
 from wholebody.base.dense_kernel import factorise, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
@@ -68,17 +69,62 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
     """Impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both axes of friction together.
 
     At every point 0 <= p_n is complementary to u_n - target >= 0, and p_t is at most friction p_n against the sliding.
+    Sweeps go over points that approach or did so before, a few of those that are near.
 
     Args:
         mobility: (3 m, 3 m) change of the velocities by unit impulses.
         velocity: (3 m,) without impulses, m/s: along the normal, then two tangents. It becomes that with them.
         friction: (m,).
         target: (m,) least velocities along the normals, m/s.
-        most: sweeps over all points.
+        most: sweeps.
         tolerance: change of all velocities at which it ends, in two sweeps, one each way, m/s.
     """
-    count = len(friction)
-    impulse, before, way = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
+    count, impulse = len(friction), np.zeros((len(friction), 3))
+    chosen, number, sweeps, some, calm = np.empty(count, np.intp), 0, 0, 8, False
+    waits = np.ones(count, np.bool_)
+    while True:
+        before = number
+        for c in range(count):
+            if waits[c] and velocity[3 * c] < target[c] and mobility[3 * c, 3 * c] > 1e-12:
+                chosen[number], waits[c] = c, False
+                number += 1
+        if sweeps >= most or (calm and number == before) or number == 0:
+            return impulse
+        among = np.empty((3 * number, 3 * number))
+        for c in range(number):
+            for d in range(number):
+                for row in range(3):
+                    for k in range(3):
+                        among[3 * c + row, 3 * d + k] = mobility[3 * chosen[c] + row, 3 * chosen[d] + k]
+        given = np.zeros((number, 3))
+        for c in range(number):
+            for row in range(3):
+                given[c, row] = impulse[chosen[c], row]
+        some = min(some, most - sweeps)
+        done, calm = _sweep(among, velocity, (friction, target, chosen[:number], given), some, tolerance)
+        sweeps, some = sweeps + done, 2 * some
+        for c in range(number):
+            one, two, three = given[c, 0], given[c, 1], given[c, 2]
+            own = chosen[c]
+            step = one - impulse[own, 0], two - impulse[own, 1], three - impulse[own, 2]
+            impulse[own, 0], impulse[own, 1], impulse[own, 2] = one, two, three
+            _push(3 * own, step[0], step[1], step[2], mobility, velocity)
+
+
+@compiled(inner=True, error_model="numpy", fastmath=FAST)
+def _sweep(
+    mobility: Array, all_velocities: Array, points: tuple[Array, Array, Indices, Array], most: int, tolerance: float
+) -> tuple[int, bool]:
+    """Sweep over k points of m, with their mobilities (3 k, 3 k); how often, and whether the last changed little.
+
+    The points have the friction (m,), target (m,), number (k,), and impulses (k, 3), which change in place.
+    """
+    friction, target, chosen, impulse = points
+    count = len(chosen)
+    velocity, before, way = np.empty(3 * count), np.zeros((count, 3)), np.zeros((count, 3))
+    for c in range(count):
+        for row in range(3):
+            velocity[3 * c + row] = all_velocities[3 * chosen[c] + row]
     last, calm = np.inf, 0
     for sweep in range(most):
         largest, square = 0.0, 0.0
@@ -86,18 +132,18 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
             before[c, 0], before[c, 1], before[c, 2] = impulse[c, 0], impulse[c, 1], impulse[c, 2]
         for number in range(count):
             c = number if sweep % 2 == 0 else count - 1 - number
-            row = 3 * c
+            row, rough = 3 * c, friction[chosen[c]]
             own, held = mobility[row, row], impulse[c, 0]
-            now = max(0.0, held + (target[c] - velocity[row]) / own)
-            if own <= 1e-12 or (now == 0.0 and held == 0.0):
+            now = max(0.0, held + (target[chosen[c]] - velocity[row]) / own)
+            if now == 0.0 and held == 0.0:
                 continue
             step, one, two = now - held, 0.0, 0.0
             # one step along both axes, with a bound of the mobility along any; 0 where nothing moves along them
             side = max(mobility[row + 1, row + 1], mobility[row + 2, row + 2]) + abs(mobility[row + 1, row + 2])
-            if friction[c] > 0.0 and side > 1e-12:
+            if rough > 0.0 and side > 1e-12:
                 one = impulse[c, 1] - (velocity[row + 1] + mobility[row + 1, row] * step) / side
                 two = impulse[c, 2] - (velocity[row + 2] + mobility[row + 2, row] * step) / side
-                size, bound = np.sqrt(one * one + two * two), friction[c] * now
+                size, bound = np.sqrt(one * one + two * two), rough * now
                 if size > bound:
                     one, two = one * (bound / size), two * (bound / size)
                 one, two = one - impulse[c, 1], two - impulse[c, 2]
@@ -109,13 +155,13 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
             _push(row, step, one, two, mobility, velocity)
         calm = calm + 1 if largest < tolerance else 0
         if calm == 2 or sweep == most - 1:
-            break
+            return sweep + 1, calm == 2
         share, last = square / last, square
         for c in range(count):
             step, one, two = along_way(share, way[c], impulse[c], before[c])
             if step != 0.0 or one != 0.0 or two != 0.0:
                 _push(3 * c, step, one, two, mobility, velocity)
-    return impulse
+    return most, False
 
 
 @compiled(error_model="numpy", fastmath=FAST)
@@ -179,6 +225,12 @@ def violation(mobility: Array, velocity: Array, friction: Array, target: Array, 
             off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
             worst = max(worst, off * side)
     return worst
+
+
+def by_inertia(inertia: Array, momentum: Array) -> Array:
+    """The velocities (n,) that an inertia (n, n), symmetric, has with a momentum (n,)."""
+    velocity, failed = lapack.dposv(inertia, momentum)[1:]
+    return np.asarray(np.linalg.solve(inertia, momentum) if failed else velocity)
 
 
 def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> tuple[Array, Array]:
