@@ -198,7 +198,7 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
 def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
     """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
 
-    Things that are moving are left out.
+    A place in a thing, such as a wall, has none. Things that are moving are left out.
     """
     owners, geometry = scene.piece_owner, scene.geometry
     still = [
@@ -215,6 +215,8 @@ def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float
             while at[2] > place[2] - 2.0:
                 result = coal.DistanceResult()
                 gap = float(coal.distance(ball, coal.Transform3s(np.eye(3), at), shape, where, request, result))
+                if gap < 1e-5 and at[2] == place[2]:
+                    return None
                 if gap < 1e-5:
                     found.append(float(at[2]))
                     break
