@@ -98,3 +98,14 @@ def test_hands_that_pass_each_other_do_not_touch(time: float, count: int) -> Non
     joints = {f"{side}_wrist": f"{side}_wrist" for side in ("left", "right")}
     found = own_rests(dataclasses.replace(motion, positions=at), joints, dict.fromkeys(joints, 1.0), ())
     assert len(found) == count
+
+
+def test_a_motion_through_a_panel_between_two_free_frames_is_told(human: wb.Figure) -> None:
+    motion = person(12)
+    moved = motion.positions + 0.9 * np.arange(12)[:, None, None] * [1.0, 0.0, 0.0]  # 0.9 m a frame
+    scene = wb.Scene(human).add(wb.Box((0.01, 3.0, 4.0)), name="panel", at=(0.9 * 6.5, 0.0, 1.0))
+    with pytest.warns(UserWarning, match=r"panel by \d+ mm after frame 6"):
+        clip = wb.retarget(dataclasses.replace(motion, positions=moved), human, scene, ground=None)
+    check = wb.check(clip, scene)
+    assert check.colliding == 0
+    assert check.between[6] > 0.05
