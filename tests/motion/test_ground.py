@@ -247,7 +247,7 @@ def program_rows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_frames_without_room_are_told_and_their_programs_stay_small(tmp_path: Path, program_rows: list[int]) -> None:
     figure = robot(tmp_path)  # of few pieces
     low = wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Box((9, 9, 1)), name="ceiling", at=(0, 0, 0.5))
-    with pytest.warns(UserWarning, match="3 of 3 frames overlap") as told:
+    with pytest.warns(UserWarning, match="3 of 3 frames, or motions to the next, overlap") as told:
         clip = wb.retarget(walker(flat, 0.1)[0], figure, low)
     check = wb.check(clip, low)
     assert (check.depth > 2e-3).all()

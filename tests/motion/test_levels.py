@@ -5,10 +5,14 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
 from tests.motion.test_ground import DT, flat, walker
+from tests.motion.test_retargeting import angles, person, places
+from wholebody.motion.footholds import RestLimits, slow
+from wholebody.motion.thing_contacts import own_rests
 
 
 def test_feet_stand_on_every_level_wherever_most_time_is_spent() -> None:
@@ -41,3 +45,67 @@ def test_a_foot_that_trembles_rests_and_one_that_hangs_does_not() -> None:
     hangs = wb.motion.ground(dataclasses.replace(motion, positions=held))
     assert not hangs.rests["right_ankle"][20:].any()
     assert not hangs.rests["right_toe"][20:].any()
+
+
+def test_a_foot_that_is_set_down_beside_where_it_was_rests_at_two_places() -> None:
+    frames = np.arange(90)
+    at = np.zeros((90, 3))
+    at[:, 1] = 0.004 * np.sin(2.0 * np.pi * 7.0 * DT * frames)  # trembles with up to 0.18 m/s
+    assert slow(at, DT, RestLimits()).all()
+    at[:, 0] = 0.035 * np.clip((frames - 45) * DT / 0.2, 0.0, 1.0)
+    found = slow(at, DT, RestLimits())
+    assert not found[45:52].all()
+    assert found[:42].all()
+    assert found[55:].all()
+
+
+def test_feet_that_hang_over_an_edge_are_not_drawn_to_the_floor(human: wb.Figure) -> None:
+    """Feet rest at the height of a box that the scene does not have there: they stay where they are."""
+    low = person(20, 1.1)
+    known = wb.motion.ground(low)
+    high = dataclasses.replace(low, positions=low.positions + [0.0, 0.0, 0.6])
+    held = tuple(one._replace(height=0.6, place=one.place + [0.0, 0.0, 0.6]) for one in known.footholds)
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    clip = wb.retarget(high, human, scene, ground=dataclasses.replace(known, footholds=held, levels=(0.6,)))
+    assert places(clip, "left_heel")[:, 2].min() > 0.5
+
+
+def test_a_skeleton_whose_axes_do_not_turn_with_its_feet_keeps_their_directions(human: wb.Figure) -> None:
+    """Places alone, as of markers: a person turns round by 180 degrees, and the axes of its joints stay."""
+    still, count = person(40, 1.1), 40
+    turns = np.array([pin.utils.rotate("z", np.pi * k / count) for k in range(count)])
+    places_ = np.einsum("nij,nkj->nki", turns, still.positions)
+    lengths = np.linalg.norm(still.offsets, axis=1)[:, None] * [1.0, 0.0, 0.0]
+    motion = dataclasses.replace(
+        still, positions=places_, offsets=lengths, rotations=np.tile(np.eye(3), (count, len(still.names), 1, 1))
+    )
+    clip = wb.retarget(motion, human)
+    ankle, toe = (motion.names.index(f"left_{part}") for part in ("ankle", "foot"))
+    ours = places(clip, "left_toe_tip") - places(clip, "left_heel")
+    flat_ones = [way * [1.0, 1.0, 0.0] for way in (ours, motion.positions[:, toe] - motion.positions[:, ankle])]
+    assert np.median(angles(*flat_ones)) < 10.0
+
+
+@pytest.mark.parametrize(("time", "count"), [(0.15, 0), (0.3, 1)])
+def test_hands_that_pass_each_other_do_not_touch(time: float, count: int) -> None:
+    motion = person(40)
+    at = np.array(motion.positions)
+    wrists = [motion.names.index(f"{side}_wrist") for side in ("left", "right")]
+    at[:, wrists] = [[0.5, 0.5, 1.2], [0.5, -0.5, 1.2]]
+    near = slice(15, 15 + round(time / motion.dt))
+    at[near, wrists[0]] = [0.5, 0.0, 1.2]
+    at[near, wrists[1]] = [0.5, 0.06, 1.2]
+    joints = {f"{side}_wrist": f"{side}_wrist" for side in ("left", "right")}
+    found = own_rests(dataclasses.replace(motion, positions=at), joints, dict.fromkeys(joints, 1.0), ())
+    assert len(found) == count
+
+
+def test_a_motion_through_a_panel_between_two_free_frames_is_told(human: wb.Figure) -> None:
+    motion = person(12)
+    moved = motion.positions + 0.9 * np.arange(12)[:, None, None] * [1.0, 0.0, 0.0]  # 0.9 m a frame
+    scene = wb.Scene(human).add(wb.Box((0.01, 3.0, 4.0)), name="panel", at=(0.9 * 6.5, 0.0, 1.0))
+    with pytest.warns(UserWarning, match=r"panel by \d+ mm after frame 6"):
+        clip = wb.retarget(dataclasses.replace(motion, positions=moved), human, scene, ground=None)
+    check = wb.check(clip, scene)
+    assert check.colliding == 0
+    assert check.between[6] > 0.05

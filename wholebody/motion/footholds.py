@@ -47,13 +47,19 @@ def speeds(places: Array, dt: float, span: float = 0.0) -> Array:
 
 
 def _steady(places: Array, dt: float, stayed: float) -> Array:
-    """(n,) speeds of a point (n, 3) between two frames, or of going through its extent over more where that is less."""
+    """(n,) speeds of a point (n, 3) between two frames, or over more where that is less.
+
+    Over more it is that of going through its extent, or of its middle before to that after if that is faster: a point
+    that trembles stays, one that is set down beside where it was does not.
+    """
     if stayed == 0.0:
         return speeds(places, dt, SPAN)
     half, last = max(1, round(stayed / dt)), len(places) - 1
     near = np.clip(np.arange(len(places))[:, None] + np.arange(-half, half + 1), 0, last)
-    extent = np.linalg.norm(np.ptp(places[near], axis=1), axis=1) - TREMBLES
-    return np.asarray(np.minimum(speeds(places, dt, SPAN), extent / (dt * np.maximum(near[:, -1] - near[:, 0], 1))))
+    around, time = places[near], dt * np.maximum(near[:, -1] - near[:, 0], 1)
+    extent = np.linalg.norm(np.ptp(around, axis=1), axis=1) - TREMBLES
+    moved = np.linalg.norm(around[:, half + 1 :].mean(axis=1) - around[:, :half].mean(axis=1), axis=1)
+    return np.asarray(np.minimum(speeds(places, dt, SPAN), np.maximum(extent, 2.0 * moved - TREMBLES) / time))
 
 
 class Point(NamedTuple):

@@ -27,6 +27,9 @@ SMALL = 1e-9
 UPRIGHT = 0.7
 """Cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands."""
 
+ALIKE = 0.9
+"""Length of the mean of directions that are one direction, with the errors of a recording."""
+
 
 class Targets(NamedTuple):
     """Goals of all frames."""
@@ -337,7 +340,9 @@ def soles(
         rise = float(own[2] / np.linalg.norm(own))
         wanted = heading / along[:, None] * np.sqrt(1.0 - rise**2) + (0.0, 0.0, rise)
         local = np.einsum("nji,nj->ni", motion.rotations[flat, start], wanted).mean(axis=0)
-        found[toe] = local / np.linalg.norm(local)
+        alike = np.linalg.norm(local)  # 1 where all frames say the same
+        if alike > ALIKE:  # axes that do not turn with the foot say nothing, as of skeletons of places alone
+            found[toe] = local / alike
     return found
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import function, instance, known, warn
@@ -45,7 +47,7 @@ from wholebody.motion.thing_contacts import (
 )
 from wholebody.scene.scene import Scene
 
-DEEP = 2e-3  # m: frames that overlap by so much are told
+DEEP = 2e-3  # m: what overlaps by so much is told
 
 
 def retarget(
@@ -80,8 +82,8 @@ def retarget(
         where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
         touch it at the same place, and go with it; hands that meet do so. In every frame the figure is free of itself,
         of the ground and of things where the holds and limits leave room for it; between frames too, as seen at some
-        places of each motion, unless things move. Frames that overlap by 2 mm or more are told. What `wb.check` tells
-        of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
+        places of each motion, unless things move. Overlaps of 2 mm or more in frames, or in the middle between two, are
+        told. What `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
 
     Raises:
         UnknownNameError: a name that does not exist.
@@ -172,19 +174,23 @@ def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | 
 
 
 def _said_inside(fitter: Fitter, holds: Holds, q: Array) -> str:
-    """What is known of frames (n, nq) that overlap deeply; empty without one."""
-    depths = np.zeros(len(q))
+    """What is known of frames (n, nq), and middles of motions to the next, that overlap deeply; empty without one."""
+    ways = [pin.interpolate(fitter.model, *ends, 0.5) for ends in pairwise(q)]
+    depths = np.zeros((len(q), 2))
     for frame, posture in enumerate(q):
         fitter.see(holds.moved(frame))
-        depths[frame] = fitter.depth(posture)
-    worst = int(depths.argmax())
-    if depths[worst] < DEEP:
+        depths[frame, 0] = fitter.depth(posture)
+        if frame < len(ways) and not holds.moved(frame):
+            depths[frame, 1] = fitter.depth(ways[frame])
+    worst, late = np.unravel_index(int(depths.argmax()), depths.shape)
+    if depths.max() < DEEP:
         return ""
-    fitter.see(holds.moved(worst))
-    first, second = fitter.deepest(q[worst])
+    fitter.see(holds.moved(int(worst)))
+    first, second = fitter.deepest(ways[worst] if late else q[worst])
     return (
-        f"{(depths >= DEEP).sum()} of {len(q)} frames overlap by {1e3 * DEEP:.0f} mm or more, most of all {first} and "
-        f"{second} by {1e3 * depths[worst]:.0f} mm in frame {worst}"
+        f"{(depths.max(axis=1) >= DEEP).sum()} of {len(q)} frames, or motions to the next, overlap by "
+        f"{1e3 * DEEP:.0f} mm or more, most of all {first} and {second} by {1e3 * depths.max():.0f} mm "
+        f"{'after' if late else 'in'} frame {worst}"
     )
 
 

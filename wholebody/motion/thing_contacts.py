@@ -198,7 +198,7 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
 def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
     """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
 
-    Things that are moving are left out.
+    A place in a thing, such as a wall, has none. Things that are moving are left out.
     """
     owners, geometry = scene.piece_owner, scene.geometry
     still = [
@@ -215,6 +215,8 @@ def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float
             while at[2] > place[2] - 2.0:
                 result = coal.DistanceResult()
                 gap = float(coal.distance(ball, coal.Transform3s(np.eye(3), at), shape, where, request, result))
+                if gap < 1e-5 and at[2] == place[2]:
+                    return None
                 if gap < 1e-5:
                     found.append(float(at[2]))
                     break
@@ -238,6 +240,7 @@ BODY = {
 
 HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
 SLACK = 0.02  # m: farther away than that by more than this nothing is touched: hands that swing past hips do not
+RESTED = 0.2  # s: hands that touch the body for less pass it
 ARM = ("shoulder", "elbow", "wrist", "hand")
 
 
@@ -284,7 +287,7 @@ def own_rests(
             local = np.einsum("nji,nj->ni", turns[start], place - at[start])
             near = near_and_slow(local, far - reach, SLACK, motion.dt) & free[role] & (far > 1e-3)
             near &= free.get(name, near)
-            for run in runs(long_runs(near, max(1, round(RestLimits().least / motion.dt)))):
+            for run in runs(long_runs(near, max(1, round(RESTED / motion.dt)))):
                 normal = way[(run.first + run.end) // 2]
                 found.append(ThingContact(role, *run, name, np.zeros(3), normal / np.linalg.norm(normal), share))
                 for taken in {role, name} & free.keys():
