@@ -107,8 +107,9 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     calf, ankle = radius("calf"), radius("ankle")
     name, shin = f"{side}_shank", 0.95 * knee  # the shin is not before the knee
     upper, lower = (min(back * calf, shin - calf) for back in (-0.15, -0.25))
-    # In the seat's plane, where buttock-popliteal length ends, the calf is as far back as the knee.
-    top = person.size("seat") + math.sqrt(max(calf**2 - (knee + upper) ** 2, 0.0))
+    # 30 mm below the seat's plane, where a seat's front may end, the calf is as far back as the knee, where
+    # buttock-popliteal length ends (estimate).
+    top = person.size("seat") + 0.03 + math.sqrt(max(calf**2 - (knee + upper) ** 2, 0.0))
     top = min(max(top, 0.1 * shank), 0.4 * shank)
     yield _between(f"{name}:0", name, calf, (upper, 0.0, -top), (lower, 0.0, -0.42 * shank))
     # Between knee and calf the shank is as thick as its bone.
