@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.flesh import settle
 from wholebody.assessment import all_pairs
 from wholebody.assessment.all_pairs import AllPairs
 from wholebody.geometry import hull, pair_distances
@@ -93,6 +94,7 @@ def test_judging_among_many_things_is_asking_coal_for_every_pair(floor: bool) ->
         pin.forwardKinematics(scene.model, data, q)
         exact = pin.GeometryData(geometry)
         pin.updateGeometryPlacements(scene.model, data, geometry, exact)
+        settle(geometry, exact)
         pin.computeDistances(geometry, exact)
         wanted = np.array([result.min_distance for result in exact.distanceResults])
         pairs.move(q)

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.flesh import settle
 from wholebody.assessment import motion as motion_assessment
 from wholebody.assessment.motion import (
     assess_motion,
@@ -30,6 +31,7 @@ def test_distances_are_those_of_coal_asked_pair_by_pair() -> None:
     data, placed = model.createData(), pin.GeometryData(geometry)
     for q, pairs in zip(postures, pairs_along(scene, postures), strict=True):
         pin.updateGeometryPlacements(model, data, geometry, placed, q)
+        settle(geometry, placed)
         places = [coal.Transform3s(place.rotation, place.translation) for place in placed.oMg]
         shapes = [piece.geometry for piece in geometry.geometryObjects]
         expected = [

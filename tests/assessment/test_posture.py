@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.flesh import settle
 from wholebody.assessment.all_pairs import AllPairs
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import Proximity
@@ -218,6 +219,7 @@ def test_all_distances_are_those_of_coal_pair_by_pair(human):
         pairs.move(q)
         pin.forwardKinematics(human.model, data, q)
         pin.updateGeometryPlacements(human.model, data, geometry, placed)
+        settle(geometry, placed)
         for number, pair in enumerate(geometry.collisionPairs):
             sides = [
                 part

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,15 @@ import numpy as np
 import wholebody as wb
 from tests.audits.population import people as rows_of
 from tests.measuring import measure
+from wholebody.base.errors import WholebodyError
+from wholebody.figures.anthropometry import dimension_names
 
 HIGH = 0.6
 """Height of the seat, metres."""
 
 SIT = wb.Sit(on="seat", back="back", erect=True)
+
+KNEES = wb.Freeze("left_knee_flexion", "right_knee_flexion")
 
 GIRDLE = wb.Freeze(*(f"{side}_clavicle_{part}" for side in ("left", "right") for part in ("protraction", "elevation")))
 
@@ -77,7 +82,7 @@ class Criterion:
 
     def _by_buttock_knee_length(self, scene: wb.Scene) -> list[Any]:
         scene.add(wb.Box((0.04, 1.2, 0.24)), name="panel", at=(self.value + 0.02, 0.0, HIGH + 0.08))
-        return [wb.Freeze("left_knee_flexion", "right_knee_flexion")]
+        return [KNEES]
 
     def _by_sitting_height(self, scene: wb.Scene) -> list[Any]:
         scene.add(wb.Box((0.8, 1.0, 0.05)), name="roof", at=(0.2, 0.0, HIGH + self.value + 0.025))
@@ -96,6 +101,17 @@ class Criterion:
     def _popliteal_height(self, figure: wb.Figure) -> wb.Problem:
         scene = _seated(figure, 0.36, self.value).add(wb.HalfSpace(), name="floor")
         return wb.Problem(scene, "sitting", constraints=[SIT, wb.Stand(on="floor", balance=False)])
+
+    def _buttock_popliteal_length(self, figure: wb.Figure) -> wb.Problem:
+        return wb.Problem(_seated(figure, self.value, thick=0.03), "sitting", constraints=[SIT, KNEES])
+
+    def _hip_breadth(self, figure: wb.Figure) -> wb.Problem:
+        out = {f"{side}_shoulder_abduction": 1.5 for side in ("left", "right")}
+        q, scene = figure.with_joints(figure.neutral, out), wb.Scene(figure)
+        high = float(figure.placement(q, "pelvis").translation[2])
+        for name, side in (("left rail", 1.0), ("right rail", -1.0)):
+            scene.add(wb.Box((0.6, 0.04, 0.4)), name=name, at=(0.0, side * (0.5 * self.value + 0.02), high))
+        return wb.Problem(scene, q, constraints=[wb.Freeze("root", *figure.joints)])
 
     def _stature(self, figure: wb.Figure) -> wb.Problem:
         scene = wb.Scene(figure).add(wb.Box((0.5, 0.9, 0.1)), name="lintel", at=(0.0, 0.0, self.value + 0.05))
@@ -119,8 +135,8 @@ class Criterion:
         return wb.Problem(scene, constraints=[wb.Freeze("root", *figure.joints)])
 
 
-def _seated(figure: wb.Figure, deep: float = 0.40, high: float = HIGH) -> wb.Scene:
-    scene = wb.Scene(figure).add(wb.Box((deep, 0.6, 0.04)), name="seat", at=(0.5 * deep, 0.0, high - 0.02))
+def _seated(figure: wb.Figure, deep: float = 0.40, high: float = HIGH, thick: float = 0.04) -> wb.Scene:
+    scene = wb.Scene(figure).add(wb.Box((deep, 0.6, thick)), name="seat", at=(0.5 * deep, 0.0, high - 0.5 * thick))
     return scene.add(wb.Box((0.03, 0.6, 0.6)), name="back", at=(-0.015, 0.0, high + 0.4))
 
 
@@ -169,6 +185,8 @@ CRITERIA = (
     Criterion("knee_height_sitting", 0.5405),
     Criterion("acromial_height", 1.4005),
     Criterion("foot_length", 0.2605),
+    Criterion("hip_breadth", 0.3505),
+    Criterion("buttock_popliteal_length", 0.4905, most=False),
 )
 """Those that judge `wb.accommodation`; the table is in whole millimetres."""
 
@@ -201,18 +219,36 @@ def _body(given: Mapping[str, Any]) -> dict[str, float]:
     return measure(wb.load("human", **given)) | {"stature": float(given["stature"])}
 
 
-def main(path: Path, count: int = 200, solved: int = 12) -> None:
-    """Print how people are judged, and the shares with the standard error of that of the people kept back."""
+def columns(people: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Dimensions of people as arrays."""
+    return {name: np.array([one[name] for one in people]) for name in people[0]}
+
+
+def bodies_of(sex: str, table: Mapping[str, Any], rows: Sequence[int]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Dimensions of people of the table, and of bodies built with these; who is refused is left out."""
+    own, built = [], []
+    for row in rows:
+        one = {name: float(column[row]) for name, column in table.items()}
+        proportions = {name: one[name] for name in dimension_names() if name in one}
+        given = {"sex": sex, "stature": one["stature"], "mass": one["mass"], "proportions": proportions}
+        with suppress(WholebodyError):
+            built.append(_body(given))
+            own.append(one)
+    return columns(own), columns(built)
+
+
+def main(path: Path, count: int = 2000, solved: int = 12, same: int = 150) -> None:
+    """Print how people are judged, the shares of `count`, and how many bodies of `same` kept back differ from these."""
     for sex in ("male", "female"):
         kept, rest = (rows_of(path, kept_back=one)[sex] for one in (True, False))
         both = {name: np.append(column, rest[name]) for name, column in kept.items()}
         given = wb.people(count, sex)
-        built = [_body(one) for one in given.values()]
-        bodies = {name: np.array([one[name] for one in built]) for name in built[0]}
+        drawn = columns([{**one["proportions"], "stature": one["stature"]} for one in given.values()])
+        own, built = bodies_of(sex, kept, np.random.default_rng(1).permutation(len(kept["age"]))[:same])
         for criterion in (*CRITERIA, *PAIRS):
-            share, all_of, back = (float(np.mean(criterion.passes_all(of))) for of in (bodies, both, kept))
-            error = float(np.sqrt(back * (1.0 - back) / len(kept["age"])))
-            told = f"{share:.3f}, table {all_of:.3f}, kept back {back:.3f} (standard error {error:.3f})"
+            share, all_of, back = (float(np.mean(criterion.passes_all(of))) for of in (drawn, both, kept))
+            differ = int((criterion.passes_all(own) != criterion.passes_all(built)).sum())
+            told = f"{share:.3f}, table {all_of:.3f}, kept back {back:.3f}; {differ} of {len(own['age'])} bodies differ"
             if solved:
                 good, number = right(criterion, dict(list(given.items())[:solved]))
                 told += f"; {good} of {number} judged as measured"

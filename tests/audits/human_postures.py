@@ -31,9 +31,10 @@ STOOP, RANGE = 35.9, 64.0
 
 THORACIC = ("spine3_flexion", "spine4_flexion")
 STRAIGHT = {"wrist_flexion": 0.0, "wrist_deviation": 0.0}  # so that no target depends on how a wrist rests
-STRUCK = 10.0
-"""Weight of each finger's meeting its key between tip and pad: of 3, 10, 30, 100 and 300 that with the least error of
-the half "fit"."""
+STRUCK, COLUMN = 3.0, 10.0
+"""Weights of each finger's meeting its key between tip and pad, and of its bending in the plane of its column, where
+the keys above and below its own are: of 1, 3, 10, 30 and 100 for either those with the least error of the half "fit".
+"""
 SOLE = np.radians(25.0)  # of pedals from level: those of examples/driver.py
 
 
@@ -179,6 +180,7 @@ def typing(figure: Figure) -> Problem:
             tip = f"{side}_{finger}_tip"
             goals.append(wb.Point(tip, (row, sign * keys * PITCH, float(elbow[2]))))
             struck.append(wb.tasks.Soft(wb.Axis(tip, (1, 0, 1), direction=DOWN), weight=STRUCK))
+            struck.append(wb.tasks.Soft(wb.Axis(tip, (0, 1, 0), direction=RIGHT), weight=COLUMN))
     goals.append(wb.Axis("gaze", FRONT, toward=(elbow[0] + 0.75, 0.0, elbow[2] + 0.3), weight=0.02))
     measures = [wb.Effort(), wb.tasks.Rhythm(), *struck]
     return wb.Problem(scene, q, goals=goals, constraints=constraints, measures=measures)

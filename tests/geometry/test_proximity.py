@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.flesh import settle
 from wholebody.geometry import pair_distances
 from wholebody.geometry.proximity import PairTable, Proximity
 
@@ -45,6 +46,7 @@ def asked_one_by_one(scene, q):
     """Distance, normal and points of every pair from coal itself, each with a fresh result."""
     data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
     pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
+    settle(scene.geometry, placed)
     shapes = [piece.geometry for piece in scene.geometry.geometryObjects]
     at = [coal.Transform3s(place.rotation, place.translation) for place in placed.oMg]
     table = {}

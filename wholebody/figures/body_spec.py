@@ -18,6 +18,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import Person
+from wholebody.geometry.flesh import mark_flesh
 from wholebody.geometry.hull import hull_piece
 
 
@@ -30,6 +31,7 @@ class Solid(NamedTuple):
     placement: pin.SE3  # of the geometry in the segment's frame
     # for a Convex, the file (relative to the URDF) and the scale along x, y, z that give its vertices
     mesh: tuple[str, tuple[float, float, float]] | None = None
+    flesh: bool = False  # whether it spreads out of the piece before it where the limb is bent
 
 
 class Link(NamedTuple):
@@ -224,6 +226,8 @@ def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[
             solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
         )
         piece.meshColor[:] = SKIN
+        if solid.flesh:
+            mark_flesh(piece)
         index[solid.name] = geometry.addGeometryObject(piece)
     for a, b in pairs:
         geometry.addCollisionPair(pin.CollisionPair(*sorted((index[a], index[b]))))

@@ -18,6 +18,7 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
+from wholebody.geometry.flesh import Flesh, flesh_of
 from wholebody.geometry.pieces import SweptPoints, swept_points
 from wholebody.scene.scene import Scene
 from wholebody.tasks.axis import across
@@ -57,6 +58,7 @@ class Surface(NamedTuple):
     # (k,) their points and flat faces, which take longer to find than what they are asked for
     swept: tuple[SweptPoints, ...]
     fixed: Any = None  # placement of a point in its joint; None for pieces
+    flesh: tuple[tuple[int, Flesh], ...] = ()  # of the pieces those that spread, by their number
 
     def with_shapes(self, shapes: tuple[Any, ...]) -> Surface:
         """The same pieces with other shapes."""
@@ -76,6 +78,8 @@ class Surface(NamedTuple):
         if len(state.kept) > MOST_KEPT:
             state.kept.clear()
         places = [state.data.oMi[joint] * self._local(number) for number, joint in enumerate(self.joints)]
+        for number, one in self.flesh:
+            places[number] = one.placed(self.geometry, state.data.oMi)
         number = state.number if any(self.joints) else STANDING
         origins = np.array([place.translation for place in places])
         found = state.kept[key] = Where(number, pin.SE3(first), places, origins, self.shapes)
@@ -165,7 +169,13 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
 
 def _of_pieces(scene: Scene, name: str, indices: Sequence[int]) -> Surface:
     owners = tuple(dict.fromkeys(scene.piece_owner[k] for k in indices))
-    return once(scene, ("surface", name, *indices), lambda: _made(name, owners, scene.geometry, indices))
+
+    def made() -> Surface:
+        flesh = {one.piece: one for one in flesh_of(scene.model, scene.geometry)}
+        spread = tuple((number, flesh[index]) for number, index in enumerate(indices) if index in flesh)
+        return with_values(_made(name, owners, scene.geometry, indices), flesh=spread)
+
+    return once(scene, ("surface", name, *indices), made)
 
 
 def _made(name: str, owners: tuple[str, ...], geometry: pin.GeometryModel, indices: Sequence[int]) -> Surface:

@@ -107,7 +107,7 @@ def test_a_seat_may_be_as_deep_as_buttock_popliteal_length(build):
             ends[segment].append((line, shape.radius))
     ((pelvis, rear),) = ends["pelvis"]
     back, seat = pelvis[:, 0].min() - rear, pelvis[:, 2].min() - rear
-    for below, least, most in ((0.001, -0.006, 0.0), (0.02, -0.03, 0.0), (0.04, -0.045, -0.004)):
+    for below, least, most in ((0.02, -0.01, 0.02), (0.03, -0.015, 0.001), (0.04, -0.022, 0.0)):
         behind = []  # of the shank at some height below the seat
         for line, radius in ends["shank"]:
             high = line[:, 2] - seat + below

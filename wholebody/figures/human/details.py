@@ -90,11 +90,12 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
         return 0.3 * beside if sign * beside > 0.0 else beside
 
     yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, inwards(out), -0.42 * thigh))
-    # Flesh that spreads on a seat. It meets things only, so that arms hang and passages are as wide as for who stands.
-    # It is thinner than the thigh by 2 mm, so that not both lie on the seat.
+    # Flesh that spreads on a seat. It meets things only, so that arms hang as of who stands. It is thinner than the
+    # thigh by 2 mm, so that not both lie on the seat, and that it is in the thigh of who stands.
     flesh = high - 0.002
     wide = sign * (0.5 * person.size("hip_breadth_sitting") - hip - flesh)
-    yield _between(f"{name}:{SPREAD}", name, flesh, (front, wide, -0.12 * thigh), (front, inwards(wide), -0.42 * thigh))
+    start, end = (front, wide, -0.12 * thigh), (front, inwards(wide), -0.42 * thigh)
+    yield with_values(_between(f"{name}:{SPREAD}", name, flesh, start, end), flesh=True)
     # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
     # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
     core = (1.0 - 0.4) * high
@@ -106,8 +107,9 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     calf, ankle = radius("calf"), radius("ankle")
     name, shin = f"{side}_shank", 0.95 * knee  # the shin is not before the knee
     upper, lower = (min(back * calf, shin - calf) for back in (-0.15, -0.25))
-    # In the seat's plane, where buttock-popliteal length ends, the calf is as far back as the knee.
-    top = person.size("seat") + math.sqrt(max(calf**2 - (knee + upper) ** 2, 0.0))
+    # 30 mm below the seat's plane, where a seat's front may end, the calf is as far back as the knee, where
+    # buttock-popliteal length ends (estimate).
+    top = person.size("seat") + 0.03 + math.sqrt(max(calf**2 - (knee + upper) ** 2, 0.0))
     top = min(max(top, 0.1 * shank), 0.4 * shank)
     yield _between(f"{name}:0", name, calf, (upper, 0.0, -top), (lower, 0.0, -0.42 * shank))
     # Between knee and calf the shank is as thick as its bone.

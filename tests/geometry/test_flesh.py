@@ -1,0 +1,34 @@
+"""Flesh spreads where a hip is bent, and only there."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from tests.measuring import measure
+from wholebody.assessment.all_pairs import AllPairs
+
+
+def between_rails(figure: wb.Figure, gap: float, flexion: float) -> float:
+    """Least distance to two rails beside the hips of who stands or sits with parallel thighs, arms out of the way."""
+    scene = wb.Scene({"anna": figure}) if figure.detail == "capsules" else wb.Scene(figure)
+    front = "anna/" if figure.detail == "capsules" else ""
+    bent = {f"{front}{side}_hip_flexion": flexion for side in ("left", "right")}
+    out = {f"{front}{side}_shoulder_abduction": 1.5 for side in ("left", "right")}
+    q = scene.figure.with_joints(pin.neutral(scene.model), bent | out)
+    for name, side in (("left", 1.0), ("right", -1.0)):
+        scene.add(wb.Box((2.0, 0.04, 0.4)), name=f"{name} rail", at=(0.0, side * (0.5 * gap + 0.02), 0.0))
+    pairs = AllPairs(scene.built)
+    pairs.move(q)
+    rails = [k for k, owner in enumerate(scene.piece_owner) if owner.endswith("rail")]
+    return float(pairs.distance[np.isin(scene.pair_table.pairs, rails).any(axis=1)].min())
+
+
+@pytest.mark.parametrize("detail", ["capsules", "hulls"])
+def test_passages_are_as_wide_as_hips_that_stand_and_seats_as_hips_that_sit(detail):
+    figure = wb.load("human", sex="female", detail=detail)
+    size = measure(figure)
+    assert size["hip_breadth_sitting"] > size["hip_breadth"] + 0.03
+    for gap in (size["hip_breadth"], size["hip_breadth_sitting"]):
+        for flexion, breadth in ((0.0, "hip_breadth"), (0.5, "hip_breadth"), (np.pi / 2, "hip_breadth_sitting")):
+            assert between_rails(figure, gap, flexion) == pytest.approx(0.5 * (gap - size[breadth]), abs=2e-4)

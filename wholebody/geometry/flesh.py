@@ -1,0 +1,91 @@
+"""Flesh that spreads where a limb is bent: hips are broader on a seat than of who stands.
+
+Pinocchio's pieces are rigid. A piece that is marked as flesh is where the geometry model has it as long as its limb is
+bent. Where the limb is straight, it is in the piece before it, which meets things first. In between it goes from one
+place to the other. Contact rows leave this motion out: 16 mm while a hip bends by 30 degrees.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, cross
+
+SPREADS = "spreads"
+"""Mark of flesh, as the `meshPath` of its piece: Pinocchio copies it with the piece, and convex pieces have no file."""
+
+# Cosines of the angles of 30 and 60 degrees between the limb and what carries it, up to which the limb is straight, and
+# from which on it is bent: people walk with less, and sit with more (estimate).
+STRAIGHT, BENT = 0.866, 0.5
+
+NUMBERS = 12  # of a placement: columns of the rotation, then the translation
+
+
+def mark_flesh(piece: pin.GeometryObject) -> None:
+    """Let a piece be flesh that spreads; the piece before it is the one in which it is otherwise."""
+    piece.meshPath = SPREADS
+
+
+class Flesh(NamedTuple):
+    """A piece that spreads out of the one before it."""
+
+    piece: int  # index in the geometry model
+    limb: int  # where in the flat placements of the pieces the axis of the piece before it begins
+    trunk: int  # where the axis begins that is along it when the limb is straight, of a piece of what carries the limb
+    sign: float  # of their product when the limb is straight
+
+    def spread(self, placed: Any) -> float:
+        """How far it is spread, from 0 to 1; `placed` are the flat placements of the pieces."""
+        limb, trunk = self.limb, self.trunk
+        cosine = placed[limb] * placed[trunk]
+        cosine += placed[limb + 1] * placed[trunk + 1] + placed[limb + 2] * placed[trunk + 2]
+        return _share(self.sign * cosine)
+
+    def placed(self, geometry: pin.GeometryModel, joints: Any) -> pin.SE3:
+        """Where it is in the world, with the joints at Pinocchio's placements."""
+        trunk, column = divmod(self.trunk, NUMBERS)
+        pieces = [geometry.geometryObjects[k] for k in (trunk, self.piece - 1, self.piece)]
+        at, limb, bent = (joints[one.parentJoint] * one.placement for one in pieces)
+        share = _share(self.sign * float(at.rotation[:, column // 3] @ limb.rotation[:, 2]))
+        straight, spread = (np.vstack([one.rotation.T, one.translation]) for one in (limb, bent))
+        rows = between(straight, spread, share)
+        return pin.SE3(rows[:3].T, rows[3])
+
+
+def _share(cosine: float) -> float:
+    share = (STRAIGHT - cosine) / (STRAIGHT - BENT)
+    if share <= 0.0 or share >= 1.0:
+        return 0.0 if share <= 0.0 else 1.0
+    return share * share * (3.0 - 2.0 * share)
+
+
+def flesh_of(model: pin.Model, geometry: pin.GeometryModel) -> tuple[Flesh, ...]:
+    """Flesh among the pieces of a geometry model."""
+    pieces = geometry.geometryObjects
+    marked = [k for k, piece in enumerate(pieces) if piece.meshPath == SPREADS]
+    first: dict[int, int] = {}
+    for k, piece in enumerate(pieces) if marked else ():
+        first.setdefault(int(piece.parentJoint), k)
+    found = []
+    for k in marked:
+        joint = int(model.parents[pieces[k].parentJoint])
+        while joint and joint not in first:
+            joint = int(model.parents[joint])
+        trunk = first[joint]
+        up, along = pieces[trunk].placement.rotation[2], pieces[k - 1].placement.rotation[2, 2]
+        column = int(np.argmax(np.abs(up)))
+        limb = NUMBERS * (k - 1) + 6  # a capsule's axis is the last column
+        found.append(Flesh(k, limb, NUMBERS * trunk + 3 * column, float(np.sign(up[column] * along))))
+    return tuple(found)
+
+
+def between(straight: Array, bent: Array, share: float) -> Array:
+    """A placement (4, 3), columns of the rotation and the translation, between two that differ by a small angle."""
+    mixed = straight + share * (bent - straight)
+    z = mixed[2] / np.linalg.norm(mixed[2])
+    x = cross(mixed[1], z)
+    x /= np.linalg.norm(x)
+    return np.array([x, cross(z, x), z, mixed[3]])
