@@ -104,6 +104,11 @@ class Assembly(AssemblyJoints):
     def __copy__(self) -> Assembly:
         return copy.deepcopy(self)
 
+    @property
+    def metric(self) -> str:
+        """What the least motion is measured by."""
+        return self._metric
+
     # ---- goals
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
