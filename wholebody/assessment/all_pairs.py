@@ -1,8 +1,6 @@
-"""Distances of all pairs of a scene at a posture: what judgements of postures look at.
+"""Distances of all pairs of a scene at a posture: what judgements of postures look at, without culling or memory.
 
-It shares nothing with the culled distances of the methods, and the answer for a posture does not depend on what was
-asked before it. Of few pairs coal is asked for every one. Of many it is asked for all that can overlap, be the nearest,
-or be nearer than a judgement asks: the others are bounded by the balls and boxes about their pieces.
+Of few pairs coal is asked for every one; of many for all that balls and boxes about their pieces do not tell apart.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """The assessment of any method's answer, computed from the posture alone.
 
-Independent of every method: it looks at all pairs without culling and without memory of earlier postures, and takes
-contact normals' derivatives from Pinocchio's own joint Jacobians. Optimality and what stands in the way are computed
-when they are asked for. `judged_postures` is the same in arrays, for many problems of one scene that are alike but for
-numbers.
+It shares nothing with the methods. Optimality and what stands in the way are computed when they are asked for.
+`judged_postures` is the same in arrays, for many problems of one scene that are alike but for numbers.
 """
 
 from __future__ import annotations

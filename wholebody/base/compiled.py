@@ -234,12 +234,9 @@ def _cache_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _loop_type() -> Any:
-    """A compiled function of numba, read back from what is kept without all that compiling needs.
+    """A compiled function of numba, read back from what is kept without all that compiling needs (0.4 of 0.5 s).
 
-    numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
-
-    numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
-    number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
+    A constant that a caller gives is a value as any: numba would compile a function anew for each.
     """
     from numba.core import event
     from numba.core.codegen import JITCodeLibrary

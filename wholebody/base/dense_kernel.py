@@ -64,9 +64,12 @@ def factorise(system: Array) -> bool:
             total = system[i, j]
             for p in range(j):
                 total -= system[i, p] * system[j, p]
-            system[i, j] = total / system[j, j] if j < i else np.sqrt(total)
-        if not system[i, i] > 0.0:
-            return False
+            if j < i:
+                system[i, j] = total / system[j, j]
+            elif total > 0.0:
+                system[i, i] = np.sqrt(total)
+            else:
+                return False
     return True
 
 
@@ -74,9 +77,10 @@ def factorise(system: Array) -> bool:
 def substitute(root: Array, right: Array) -> None:
     """Solve L L' x = b in place of b (n,), with L in the lower triangle of a matrix."""
     for i in range(len(right)):
+        total = right[i]
         for p in range(i):
-            right[i] -= root[i, p] * right[p]
-        right[i] /= root[i, i]
+            total -= root[i, p] * right[p]
+        right[i] = total / root[i, i]
     for i in range(len(right) - 1, -1, -1):
         right[i] /= root[i, i]
         for p in range(i):

@@ -1,8 +1,7 @@
 """Jobs in child processes: a job that crashes, hangs or fills the memory ends only its own process.
 
-A job is a function with arguments and a deadline. An alarm of the system, which compiled code cannot block, ends the
-process at the deadline. The job may move its deadline (`allow`) and send notes before its answer (`tell`). A process
-serves one job after the other and is replaced after it ended. It ends by itself when its parent has ended.
+An alarm of the system, which compiled code cannot block, ends the process at a job's deadline, which the job may move
+(`allow`); it may send notes before its answer (`tell`). A process ends by itself when its parent has ended.
 """
 
 from __future__ import annotations

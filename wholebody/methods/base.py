@@ -189,11 +189,9 @@ class SolvingTracker(NotCopyable):
         problem: to be solved whose goals it follows.
         dt: seconds a step.
         workspace: its own workspace; between calls others may move it.
-        unswept: 0: no step is tested for passing through things.
-        leaves_overlap: False.
     """
 
-    unswept = 0.0
+    unswept = 0.0  # no step is tested for passing through things
     leaves_overlap = False
 
     def __init__(self, method: Method, problem: Problem, dt: float) -> None:

@@ -7,7 +7,7 @@ goal beyond the distances between joints, or inside of what does not move, has a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple
 
 import coal
@@ -16,7 +16,6 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Status
@@ -24,7 +23,7 @@ from wholebody.tasks.base import Bound
 from wholebody.tasks.frame import Frame, Hold, Orientation
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.point import Point
-from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, ReachCones, TwistRow
+from wholebody.tasks.range_of_motion import ConeRow, CoupledRow, RangeConstraint, TwistRow
 
 CLEAR = 1e-4  # m, rad: smaller differences are left to the search
 NEAREST = 1.02  # factor on the least possible goal error, up to which a posture counts as the nearest
@@ -124,22 +123,14 @@ class _Finder:
         least, most = self._reachable()
         for number, term in enumerate(self._problem.constraints):
             name = self._problem.constraint_names[number]
-            if isinstance(term, RangeOfMotion):
+            if isinstance(term, RangeConstraint):
                 for row, range_name in zip(term.rows, term.row_names, strict=True):
-                    if isinstance(row, TwistRow):
-                        self._turned(f"{name}, {range_name!r}", row.limb, row.reference, row.value)
+                    if isinstance(row, (TwistRow, ConeRow)):
+                        self._turned(f"{name}, {range_name!r}", row)
                     else:
                         axes = (row.coordinates,) if isinstance(row, CoupledRow) else row.axes
                         dofs = [coordinate.idx_v for axis in axes for coordinate in axis]
                         self._violated(f"{name}, {range_name!r}", row.largest(least, most), dofs)
-            elif isinstance(term, ReachCones):
-                cones = self._problem.scene.figure.cones if term.names is None else term.names
-                for place, (limb, cone_name) in enumerate(zip(term.limbs, cones, strict=True)):
-
-                    def value(state: State, ask: Callable[[State], Array] = term.value, row: int = place) -> float:
-                        return float(ask(state)[row])
-
-                    self._turned(f"{name}, {cone_name!r}", limb.limb, limb.reference, value)
 
     def _reachable(self) -> tuple[Array, Array]:
         """Least and largest entries (nq,) of postures; infinite but for joints of one angle with limits."""
@@ -151,15 +142,16 @@ class _Finder:
                 least[joint.idx_q] = most[joint.idx_q] = start[joint.idx_q]
         return least, most
 
-    def _turned(self, name: str, limb: Place, reference: Place, value: Callable[[State], float]) -> None:
+    def _turned(self, name: str, row: TwistRow | ConeRow) -> None:
         """Report a range of one frame in another where the two are in one rigid group."""
+        limb, reference = row.limb, row.reference
         if self._group[limb.joint] == self._group[reference.joint]:
             model, dofs = self._problem.scene.model, list[int]()
             for end in (limb.joint, reference.joint):
                 while end and end != self._group[limb.joint]:
                     dofs += range(model.idx_vs[end], model.idx_vs[end] + model.nvs[end])
                     end = model.parents[end]
-            self._violated(name, value(self._workspace.state.update(self._problem.start)), dofs)
+            self._violated(name, row.value(self._workspace.state.update(self._problem.start)), dofs)
 
     def _violated(self, name: str, largest: float, dofs: list[int]) -> None:
         """Report a range whose largest value is negative, with the bounds that keep some of its degrees of freedom."""

@@ -44,12 +44,8 @@ class OwnSurface(NamedTuple):
     """A point on the surface of its own piece, which touches there only where the two normals are opposed.
 
     With c the centre of curvature, p the point and P(c) the point of the other surface nearest to c, they are where
-    p = P(c). The distances of point and piece say so to second order alone, by r (1 - cos t) for an angle t: their
-    derivatives are the same there. The two rows t_k . (p - P(c)) do not vanish. They may be as large as leaves the
-    point at most `ROUND_DEPTH` off where the piece touches; within that, the distance is that of the piece.
-
-    Of a flat face any point behind p serves as c: what does not penetrate the face is nearest to it at p. The distances
-    of point and corners meet there as well, without a direction in which all of them give way.
+    p = P(c): two rows t_k . (p - P(c)), which may leave the point at most `ROUND_DEPTH` off where the piece touches;
+    within that, the distance is that of the piece. Of a flat face any point behind p serves as c.
     """
 
     middle: Surface  # c as a surface

@@ -1,12 +1,8 @@
 """Parts of a grip: bars and rings that a hand closes around, and sides of a thing that are pressed against each other.
 
-A bar has the direction of its thing's longest axis. A ring, such as a steering wheel, is held at the side of the hand,
-where its rim counts as a bar.
-
-The normal of a contact is the direction from a finger to the nearest point of the thing. Two contacts oppose where
-their normals are antiparallel. By their angle from that a friction cone has to be wide: forces along the line between
-two contacts hold a thing where both normals are within the friction angle of it (Nguyen 1988, "Constructing
-force-closure grasps"). Of several fingers the mean of their normals counts.
+A bar has the direction of its thing's longest axis; the rim of a ring, such as a steering wheel, counts as one. Two
+contacts oppose where their normals are antiparallel within the friction angle (Nguyen 1988, "Constructing force-closure
+grasps"); of several fingers the mean of their normals counts.
 """
 
 from __future__ import annotations

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import known
@@ -21,73 +20,26 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, filled
 
 
-class Limb(NamedTuple):
-    """One reach cone on a figure."""
+class ConeRow(NamedTuple):
+    """The signed angle from a limb's direction to the nearest edge of its reach cone."""
 
     cone: Any  # the spherical polygon
     reference: inputs.Place  # the frame to which the cone is fixed
     limb: inputs.Place  # the frame that turns within the cone
     axis: Array  # (3,) the limb's direction in its frame, a unit vector
 
+    def value(self, state: State) -> float:
+        """Radians, positive inside."""
+        turn = state.frame(self.reference.frame).rotation
+        return float(self.cone.signed_angle((state.frame(self.limb.frame).rotation @ self.axis) @ turn)[0])
 
-@dataclass(frozen=True, eq=False)
-class ReachCones(Constraint):
-    """Keep the direction of limbs inside the spherical polygons that bound the range of their joints.
-
-    Limits of three revolute joints in a row allow directions that a shoulder or a hip does not (Wilhelms and Van Gelder
-    2001, "Fast and Easy Reach-Cone Joint Limits", Journal of Graphics Tools 6(2)). The value is the signed angle from
-    the limb's direction to the nearest edge of its polygon, positive inside [rad].
-
-    Attributes:
-        names: names of the figure's cones; None for all of them.
-
-    Examples:
-        >>> shoulder = wb.tasks.ReachCones(["left_shoulder"])
-    """
-
-    angular = np.ones((), dtype=bool)  # of all rows
-    names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
-    limbs: tuple[Limb, ...] = field(init=False, repr=False)  # each cone with its frames and joints
-    _joints: NDArray[np.intp] = field(init=False, repr=False)
-    _against: NDArray[np.intp] = field(init=False, repr=False)
-
-    def resolve(self, scene: Scene, start: Array) -> ReachCones:
-        """Find the cones and their frames."""
-        cones = scene.figure.cones
-        if not cones:
-            raise InputError("ReachCones: this figure has no reach cones; leave the constraint out")
-        limbs = []
-        for name in cones if self.names is None else self.names:
-            cone = cones[known(name, cones, "reach cone", "ReachCones")]
-            reference = inputs.find_place(scene, cone.reference, "ReachCones")
-            limb = inputs.find_place(scene, cone.limb, "ReachCones")
-            limbs.append(Limb(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))
-        return filled(
-            self,
-            limbs=tuple(limbs),
-            _joints=np.array([limb.limb.joint for limb in limbs], dtype=np.intp),
-            _against=np.array([limb.reference.joint for limb in limbs], dtype=np.intp),
-        )
-
-    def value(self, state: State) -> Array:
-        """(m,) signed angle to the edge of each cone, positive inside [rad]."""
-        result = np.empty(len(self.limbs))
-        for row, limb in enumerate(self.limbs):
-            turn = state.frame(limb.reference.frame).rotation
-            result[row] = limb.cone.signed_angle((state.frame(limb.limb.frame).rotation @ limb.axis) @ turn)[0]
-        return result
-
-    def jacobian(self, state: State) -> Array:
-        """(m, nv)."""
-        wrenches = np.zeros((len(self.limbs), 6))
-        for row, limb in enumerate(self.limbs):
-            turn = state.frame(limb.reference.frame).rotation
-            direction = state.frame(limb.limb.frame).rotation @ limb.axis
-            # The direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g).
-            x, y, z = direction.tolist()
-            a, b, c = (turn @ limb.cone.signed_angle(direction @ turn)[1]).tolist()
-            wrenches[row, 3:] = (y * c - z * b, z * a - x * c, x * b - y * a)
-        return state.rows(wrenches, self._joints, self._against)
+    def write(self, state: State, row: Array) -> None:
+        """Write the derivative into a row (nv,) of zeros."""
+        turn = state.frame(self.reference.frame).rotation
+        direction, wrench = state.frame(self.limb.frame).rotation @ self.axis, np.zeros((1, 6))
+        # The direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g).
+        wrench[0, 3:] = cross(direction, turn @ self.cone.signed_angle(direction @ turn)[1])
+        row += state.rows(wrench, np.array([self.limb.joint]), np.array([self.reference.joint]))[0]
 
 
 OPPOSITE = 1e-9
@@ -191,11 +143,62 @@ class TwistRow(NamedTuple):
         return base, base.T @ state.frame(self.limb.frame).rotation
 
 
-Row: TypeAlias = CoupledRow | EllipticRow | TwistRow
+Row: TypeAlias = ConeRow | CoupledRow | EllipticRow | TwistRow
 
 
 @dataclass(frozen=True, eq=False)
-class RangeOfMotion(Constraint):
+class RangeConstraint(Constraint):
+    """A row for each of some cones or ranges: the angle to its end, positive inside [rad]."""
+
+    angular = np.ones((), dtype=bool)  # of all rows
+    rows: tuple[Row, ...] = field(init=False, repr=False)  # each cone or range with its frames and joints
+    row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
+
+    def value(self, state: State) -> Array:
+        """(m,) angle to the end of each range, positive inside [rad]."""
+        return np.array([row.value(state) for row in self.rows])
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        result = np.zeros((len(self.rows), state.model.nv))
+        for row, into in zip(self.rows, result, strict=True):
+            row.write(state, into)
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class ReachCones(RangeConstraint):
+    """Keep the direction of limbs inside the spherical polygons that bound the range of their joints.
+
+    Limits of three revolute joints in a row allow directions that a shoulder or a hip does not (Wilhelms and Van Gelder
+    2001, "Fast and Easy Reach-Cone Joint Limits", Journal of Graphics Tools 6(2)). The value is the signed angle from
+    the limb's direction to the nearest edge of its polygon, positive inside [rad].
+
+    Attributes:
+        names: names of the figure's cones; None for all of them.
+
+    Examples:
+        >>> shoulder = wb.tasks.ReachCones(["left_shoulder"])
+    """
+
+    names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
+
+    def resolve(self, scene: Scene, start: Array) -> ReachCones:
+        """Find the cones and their frames."""
+        cones, rows = scene.figure.cones, list[Row]()
+        if not cones:
+            raise InputError("ReachCones: this figure has no reach cones; leave the constraint out")
+        names = tuple(cones) if self.names is None else tuple(self.names)
+        for name in names:
+            cone = cones[known(name, cones, "reach cone", "ReachCones")]
+            reference = inputs.find_place(scene, cone.reference, "ReachCones")
+            limb = inputs.find_place(scene, cone.limb, "ReachCones")
+            rows.append(ConeRow(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))
+        return filled(self, rows=tuple(rows), row_names=names)
+
+
+@dataclass(frozen=True, eq=False)
+class RangeOfMotion(RangeConstraint):
     """Keep joints within the ranges of motion that more than one joint angle decides.
 
     Muscles over two joints (hamstrings, gastrocnemius, rectus femoris), the inward rotation of the raised upper arm,
@@ -211,10 +214,7 @@ class RangeOfMotion(Constraint):
         >>> neck = wb.tasks.RangeOfMotion(["neck"])
     """
 
-    angular = np.ones((), dtype=bool)  # of all rows
     names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
-    rows: tuple[Row, ...] = field(init=False, repr=False)  # each range with its frames and joints
-    row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
 
     def resolve(self, scene: Scene, start: Array) -> RangeOfMotion:
         """Find the ranges, their frames and joints."""
@@ -224,17 +224,6 @@ class RangeOfMotion(Constraint):
         names = tuple(ranges) if self.names is None else tuple(self.names)
         rows = [_row(ranges[known(name, ranges, "range of motion", "RangeOfMotion")], scene) for name in names]
         return filled(self, rows=tuple(rows), row_names=names)
-
-    def value(self, state: State) -> Array:
-        """(m,) angle to the end of each range, positive inside [rad]."""
-        return np.array([row.value(state) for row in self.rows])
-
-    def jacobian(self, state: State) -> Array:
-        """(m, nv)."""
-        result = np.zeros((len(self.rows), state.model.nv))
-        for row, into in zip(self.rows, result, strict=True):
-            row.write(state, into)
-        return result
 
 
 def _between(coordinates: tuple[Coordinate, ...], least: Array, most: Array) -> tuple[float, float]:

@@ -1,11 +1,8 @@
 """Differences between the placement of a frame and its target, and their exact derivatives.
 
-A spatial velocity V = (v, w) has its linear part at the world's origin. A point p that moves with a joint has the
-velocity v + w x p, so its rows are ``[I, -skew(p)]``. A rotation R that moves with the joint becomes ``exp(w dt) R``;
-the rotation vector log3(R T') of its difference from a target T has the derivative J' w, in world axes, where
-J = Jlog3(R T') is the inverse of the right Jacobian of SO(3) and its transpose that of the left one (Chirikjian 2011,
-"Stochastic Models, Information Theory, and Lie Groups", vol. 2, section 10.6; Forster et al. 2017, "On-Manifold
-Preintegration for Real-Time Visual-Inertial Odometry", section III).
+A spatial velocity V = (v, w) has its linear part at the world's origin, so a point p has the rows ``[I, -skew(p)]``.
+The rotation vector log3(R T') from a target T has the derivative Jlog3(R T')' w, in world axes (Chirikjian 2011,
+"Stochastic Models, Information Theory, and Lie Groups", vol. 2, section 10.6).
 """
 
 from __future__ import annotations

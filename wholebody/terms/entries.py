@@ -13,7 +13,7 @@ from wholebody import tasks
 from wholebody.base.arrays import Array
 from wholebody.tasks.base import Constraint, Goal
 from wholebody.tasks.inputs import WORLD
-from wholebody.tasks.range_of_motion import Coordinate, CoupledRow, EllipticRow
+from wholebody.tasks.range_of_motion import ConeRow, Coordinate, CoupledRow, EllipticRow, RangeConstraint
 from wholebody.tasks.residuals import PlacementResidual
 
 RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE, COUPLED, ELLIPSE, TWIST = range(11)
@@ -155,18 +155,7 @@ def _posture(term: tasks.Posture, model: pin.Model) -> list[Entry] | None:
     return entries if in_order else None
 
 
-def _cones(term: tasks.ReachCones, model: pin.Model) -> list[Entry]:
-    entries = []
-    for limb in term.limbs:
-        axis = limb.limb.placement.rotation @ limb.axis
-        reference = limb.reference.placement.rotation
-        edges = np.hstack(limb.cone.planes.reshape(5, -1, 3))
-        floats = np.concatenate([axis, reference.T.ravel()])
-        entries.append(Entry(CONE, (limb.limb.joint, limb.reference.joint), floats, 1, edges))
-    return entries
-
-
-def _ranges(term: tasks.RangeOfMotion, model: pin.Model) -> list[Entry] | None:
+def _ranges(term: RangeConstraint, model: pin.Model) -> list[Entry] | None:
     entries = []
     for row in term.rows:
         if isinstance(row, CoupledRow):
@@ -182,6 +171,11 @@ def _ranges(term: tasks.RangeOfMotion, model: pin.Model) -> list[Entry] | None:
             limits = np.pad(np.vstack([row.offset, row.limits]), ((0, 0), (0, missing)))
             limits[1:, len(row.axes) :] = np.array([[-1.0], [1.0]])
             entries.append(Entry(ELLIPSE, places, np.array([*limits.ravel(), row.size]), 1))
+        elif isinstance(row, ConeRow):
+            axis, reference = row.limb.placement.rotation @ row.axis, row.reference.placement.rotation
+            edges = np.hstack(row.cone.planes.reshape(5, -1, 3))
+            floats = np.concatenate([axis, reference.T.ravel()])
+            entries.append(Entry(CONE, (row.limb.joint, row.reference.joint), floats, 1, edges))
         else:
             limb = row.limb.placement.rotation
             center = row.reference.placement.rotation @ row.part.center
@@ -207,6 +201,6 @@ _WRITERS: dict[type, Callable[[Any, pin.Model], list[Entry] | None]] = {
     tasks.CenterOfMass: _mass_center,
     tasks.Balance: _balance,
     tasks.Posture: _posture,
-    tasks.ReachCones: _cones,
+    tasks.ReachCones: _ranges,
     tasks.RangeOfMotion: _ranges,
 }

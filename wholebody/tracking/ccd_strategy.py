@@ -53,10 +53,8 @@ class CCDStrategy:
 class RigidTranslation:
     """Follows tracked postures of a figure with a free root that is displaced as a rigid body.
 
-    Schmidl and Lin find that "even a complicated object, such as an articulated hand, can be handled in this way": the
-    fingers follow the glove, and the hand with its present fingers is displaced by pure translation. PD_g is the sum of
-    pd_i^2 n_i over the sum of pd_i (their equation 1), with n_i out of the obstacle; it is computed again until nothing
-    overlaps. Raises InputError for a figure that is fixed to the world.
+    The fingers follow the glove, and the hand with its present fingers is translated by PD_g (Schmidl and Lin, equation
+    1), computed again until nothing overlaps. Raises InputError for a figure that is fixed to the world.
     """
 
     sweep_tolerance = 2e-4

@@ -192,10 +192,8 @@ def _depth(workspace: Workspace, q: Array) -> float:
 class AssemblyDrag:
     """Follows a goal of an assembly that is moved from frame to frame; it moves the assembly's bodies.
 
-    If joints or contacts do not hold after a frame's few Newton steps, or its motion passes through something, the
-    bodies go back to where they were and the goal moves by a shorter distance, or not in that frame.
-
-    Raises InputError where there is no such goal.
+    If joints or contacts do not hold after a frame, or its motion passes through something, the goal moves by a shorter
+    distance, or not in that frame. Raises InputError where there is no such goal.
     """
 
     def __init__(self, assembly: Assembly, goal: int, seconds: float) -> None:

@@ -29,9 +29,7 @@ CLEARANCE = 1e-3
 class Attraction(DistanceMeasure):
     """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
 
-    It and the motion limit change between steps, because the tracker is read in every frame. Its unconstrained minimum
-    is the tracked posture itself, which one program reaches in one step without contact. A goal would be met at any
-    cost in the other joints, and its force does not grow with the distance.
+    Without contact one program reaches its minimum. A goal would be met at any cost in the other joints.
     """
 
     def __init__(self, q: Array, weights: Array) -> None:

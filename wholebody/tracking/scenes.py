@@ -1,8 +1,4 @@
-"""Scenes with scripted trackers, from files: smooth motion from pose to pose, with the tremor of a tracked person.
-
-Those of `scenes.toml` are the experiments of Schmidl and Lin, "Real-time physically-based interaction between avatars
-and virtual environments" (table 2, figures 2, 5, 7 and 8), without their balls.
-"""
+"""Scenes with scripted trackers, from files; those of `scenes.toml` are the experiments of Schmidl and Lin."""
 
 from __future__ import annotations
 

@@ -276,7 +276,6 @@ def test_where_an_end_is_blocked_nothing_free_beside_the_answer_takes_less_effor
         if not answer.solved or answer.assessment.measure < 1.01 * alone:
             continue  # nothing blocks it
         followed += 1
-        assert not answer.programs  # it is found by the chain alone
         for sign in (1.0, -1.0):
             q, before = answer.q, None
             for _ in range(15):

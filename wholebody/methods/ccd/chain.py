@@ -70,24 +70,18 @@ class LinkFinder:
         self._paths = [frozenset(path) for path in limbs.paths]
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
-    def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The overlapping link nearest to the root; None if no joint can change an overlap."""
-        links = self._links(overlaps)
-        return self._link(links[min(links)]) if links else None
-
-    def deepest(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The link that is deepest inside; None if no joint can change an overlap."""
-        links = self._links(overlaps).values()
-        return self._link(max(links, key=lambda found: max(item.overlap.depth for item in found))) if links else None
-
-    def _links(self, overlaps: Sequence[Overlap]) -> dict[int, list[_Side]]:
-        """The overlaps that a joint can change, by the node of their link."""
+    def link(self, overlaps: Sequence[Overlap], deepest: bool) -> Link | None:
+        """The overlapping link nearest to the root, or `deepest` inside; None if no joint can change an overlap."""
         links: dict[int, list[_Side]] = {}
         for overlap in overlaps:
             found = self._side(overlap)
             if found is not None:
                 links.setdefault(found.node, []).append(found)
-        return links
+        if not links:
+            return None
+        if deepest:
+            return self._link(max(links.values(), key=lambda sides: max(side.overlap.depth for side in sides)))
+        return self._link(links[min(links)])
 
     def _link(self, sides: list[_Side]) -> Link:
         """The link of these overlaps, moved by the nodes that change the deepest of them."""

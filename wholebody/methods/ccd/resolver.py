@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -13,15 +13,12 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Link, LinkFinder, Overlap, Tracked
+from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Overlap, Tracked
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.control import Control
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
-
-Find = Callable[[LinkFinder, Sequence[Overlap]], "Link | None"]
-"""What chooses the link to be moved."""
 
 TOLERANCE = 1e-4  # m: largest overlap that is ignored; coal's own accuracy is a hundredth of it
 PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
@@ -120,7 +117,7 @@ class OverlapResolver:
         q = q.copy()
         overlaps = self.query(q)
         names = list(self.chains)
-        find = LinkFinder.nearest_root
+        deepest = False
         for _ in range(4):
             if not overlaps:
                 break
@@ -128,18 +125,18 @@ class OverlapResolver:
             for k in rng.permutation(len(names)).tolist():
                 if self.counts.work > most_work or self.control.over:
                     break
-                overlaps = self._leave(self.chains[names[k]], q, overlaps, find)
+                overlaps = self._leave(self.chains[names[k]], q, overlaps, deepest)
             if overlaps and self.deepest > 0.98 * before:  # the pass gained too little
-                if find is LinkFinder.deepest or not self.exact:
+                if deepest or not self.exact:
                     break
-                find = LinkFinder.deepest  # a forearm that cannot leave keeps the hand from its turn
+                deepest = True  # a forearm that cannot leave keeps the hand from its turn
         return q, overlaps
 
-    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], find: Find) -> list[Overlap]:
+    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], deepest: bool) -> list[Overlap]:
         """Move one chain out of its overlaps, with a new goal every time; q is changed in place."""
         worst, node = np.inf, -1
         for _ in range(8):
-            link = find(chain.finder, overlaps)
+            link = chain.finder.link(overlaps, deepest)
             if link is None or (link.node == node and link.depth > 0.8 * worst):
                 break
             worst, node = link.depth, link.node

@@ -119,7 +119,7 @@ class _Reader:
             if id(term) in left_out:
                 continue
             if isinstance(term, ReachCones):
-                cones.update(dict.fromkeys(self._figure.cones if term.names is None else term.names))
+                cones.update(dict.fromkeys(term.row_names))
             elif isinstance(term, RangeOfMotion):
                 ranges.update(dict.fromkeys(term.row_names))
             elif isinstance(term, Hold) and id(term) in self._closed:

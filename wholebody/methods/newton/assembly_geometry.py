@@ -124,9 +124,8 @@ class AssemblyFigure(FigureBodies):
 class LooseBodies:
     """What a `wholebody.Scene` asks of its figure: a free joint a body, the figures' own joints, all pieces and pairs.
 
-    Joint k + 1 of `model` is body k; a posture has seven numbers for a body, and the posture of each figure. Figures
-    keep their joints, because Pinocchio's data of a model grow with the cube of its degrees of freedom: by 0.2 GB for
-    30 free bodies, by 7 GB for 100.
+    Joint k + 1 of `model` is body k. Figures keep their joints, because Pinocchio's data grow with the cube of the
+    degrees of freedom: by 7 GB for 100 free bodies.
     """
 
     root = "free"

@@ -6,7 +6,7 @@ Its tracker keeps the equations and their analysis from frame to frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import TOLERANCE, SolvingTracker
+from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -22,7 +22,6 @@ from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
 from wholebody.problem import Problem
-from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
@@ -87,28 +86,14 @@ class Newton(Settings, Descends):
         return NewtonTracker(self, problem, dt)
 
 
-class NewtonStep(NamedTuple):
-    """Answer of one frame: posture (nq,), iterations, linear systems, patterns so far, and collisions."""
-
-    q: Array
-    iterations: int
-    systems: int
-    structures: int
-    collisions: tuple[Collision, ...] = ()
-
-
 class NewtonTracker(SolvingTracker):
     """Follows the goals of one problem, frame by frame.
 
     Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker
     remembers the previous frame, so it serves one motion and one thread at a time.
-
-    Attributes:
-        unswept: radians and metres: shorter motions need no sweep, because every iteration of a frame was tested.
-        leaves_overlap: True.
     """
 
-    unswept = SHORT
+    unswept = SHORT  # every iteration of a frame was tested
     leaves_overlap = True
 
     def __init__(self, method: Any, problem: Problem, dt: float | None) -> None:
@@ -119,7 +104,7 @@ class NewtonTracker(SolvingTracker):
         self._alone = OneAtATime("tracker")
         self._lay_out()
 
-    def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
+    def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
         Weights count where goals conflict. So all goals are first followed alike; the frame is made again with their
@@ -148,7 +133,12 @@ class NewtonTracker(SolvingTracker):
             # where the time of a frame was not enough to restore the constraints, the next goes on from here
             cut = BUDGET.over and not found.hard <= FRAMES.tolerance
             end = q if cut else active_system.posture(found.x)
-            return NewtonStep(end, spent, found.systems, active_system.structures)
+            return FrameStep(end, spent)
+
+    @property
+    def structures(self) -> int:
+        """Number of patterns that were analysed."""
+        return self._active_system.structures
 
     def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
         """The end of the iteration from the posture q (nq,); goals count alike if `even`."""

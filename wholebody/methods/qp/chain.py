@@ -157,9 +157,9 @@ class Descents:
             most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
             for each in (branches or self._branches()).cheaper(most) if held else ():
                 # it is only near to the goals, or was a little beyond limits and clamped to them
-                values = self._beside(float(each[self.chain.held]), each)
-                if values is not None and self._is_free(self.chain.posture(values, self.asked.at)):
-                    return self._to_the_edge(values)
+                values = self.chain.beside(self.asked.goals, self.asked.nearest, each, how_far(self.settings, 1))
+                if values is not None and self._is_free(q := self.chain.posture(values, self.asked.at)):
+                    return Met(q, tuple(self.trace), not self.settings.measures)
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
                 return met if self.chain.arm is None else with_values(met, blocked=None)
@@ -264,29 +264,6 @@ class Descents:
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
-
-    def _to_the_edge(self, values: Array) -> Met:
-        """From a free sample (n,) along its branch to the least effort, as far as clearances are kept, by bisection."""
-        chain, (goals, at, nearest, _), trace = self.chain, self.asked, tuple(self.trace)
-        blocked = chain.along(goals, nearest, values) if self.measured else None
-        if blocked is None:
-            return Met(chain.posture(values, at), trace, not self.settings.measures)
-        end = float(blocked[chain.held])
-        least = self._beside(end, blocked)
-        if least is not None and self._is_free(q := chain.posture(least, at)):
-            return Met(q, trace, True)
-        while abs(end - values[chain.held]) > 1e-6:
-            half = 0.5 * (end + float(values[chain.held]))
-            middle = self._beside(half, values)
-            if middle is not None and self._is_free(chain.posture(middle, at)):
-                values = middle
-            else:  # blocked, or beyond limits
-                end = half
-        return Met(chain.posture(values, at), trace, True)
-
-    def _beside(self, value: float, values: Array) -> Array | None:
-        """See `PlainChain.beside`."""
-        return self.chain.beside(self.asked.goals, self.asked.nearest, value, values, how_far(self.settings, 1))
 
     def _effort(self, q: Array) -> float:
         away = self.chain.angles(q) - self.asked.nearest[0]

@@ -115,5 +115,4 @@ def compiled_kernel(closed_form_kernel: Any) -> None:
     closed_form_kernel.branches(arm, goal, np.zeros(0), found)
     order = np.zeros(0, dtype=np.intp)
     closed_form_kernel.sampled(arm, goal, limits, near, found, np.zeros((0, BRANCHES)), order)
-    closed_form_kernel.along(arm, goal, limits, near, 0.0, one.copy())
-    closed_form_kernel.beside(arm, goal, limits, near, 0.0, one, one.copy())
+    closed_form_kernel.beside(arm, goal, limits, near, one, one.copy())

@@ -29,11 +29,8 @@ class QP(Settings, Descends):
     """Quadratic programs, solved by a QP solver of your choice.
 
     A solve is the best of a descent, of another that seeks feasibility first, and of seeded starts, which are tried
-    only where the earlier ones did not reach the goals, and within the budget. A robot of plain joints on a fixed base
-    that is asked for places and rotations alone first goes to its goals as if nothing were in its way. Where nothing
-    is, the descent begins there, or ends there without measures.
-
-    These are settings alone: one object serves any number of problems and threads at the same time.
+    only where the earlier ones did not reach the goals, and within the budget. These are settings alone: one object
+    serves any number of problems and threads at the same time.
 
     Attributes:
         solver: "osqp", "active_set" (our own), "daqp" or any name that qpsolvers lists on this machine; see `wholebody

@@ -130,18 +130,10 @@ class PlainChain:
         values = found.reshape(-1, len(self.idx_v))
         return Branches(values, effort.ravel(), values[order[:count]])
 
-    def along(self, goals: Goals, nearest: Array, values: Array) -> Array | None:
-        """The guide's branch (n,) of least effort between the samples beside values (n,); None where there is none."""
-        found, held = values.copy(), self.held
-        turn = min(self.chain.upper[held] - self.chain.lower[held], 2.0 * np.pi)
-        spacing, limits = turn / (SEEDS.samples - 1), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().along(self.guide, goals.tables[0], limits, nearest, spacing, found)
-        return found if effort < np.inf else None
-
-    def beside(self, goals: Goals, nearest: Array, value: float, values: Array, asked: Array) -> Array | None:
-        """The branch (n,) nearest to values (n,) where the joint that is held has a value; None where there is none."""
+    def beside(self, goals: Goals, nearest: Array, values: Array, asked: Array) -> Array | None:
+        """The branch (n,) nearest to values (n,), with that of the joint that is held; None where there is none."""
         found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().beside(self.guide, goals.tables[0], limits, nearest, value, values, found)
+        effort = closed_form_kernel().beside(self.guide, goals.tables[0], limits, nearest, values, found)
         return self._met(goals, found, asked) if effort < np.inf else None
 
     def _met(self, goals: Goals, values: Array, asked: Array) -> Array | None:

@@ -38,13 +38,9 @@ class QPTracker(SolvingTracker):
     may be moved. The steps of a new tracker depend on nothing that was solved before.
 
     A tracker remembers the step before, so it is for one figure and one thread at a time.
-
-    Attributes:
-        unswept: infinite: no step passes through anything, and a frame of several is swept where it is long.
-        leaves_overlap: True.
     """
 
-    unswept = np.inf
+    unswept = np.inf  # no step passes through anything, and a frame of several is swept where it is long
     leaves_overlap = True
 
     def __init__(self, problem: Problem, solver: QPSolver, dt: float, method: Method) -> None:
