@@ -38,7 +38,7 @@ TOGETHER = (
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
-        "wholebody.motion.trajectory.interior_point",
+        "wholebody.motion.trajectory.banded_kernel",
     ),
     (
         "wholebody.methods.qp.tracking",

@@ -11,6 +11,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled, with_loops
 from wholebody.base.dense_kernel import factorise, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
+from wholebody.methods.qp.dense_kernel import gram
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
 ROUNDS = 8  # of 50 steps
@@ -34,26 +35,14 @@ def mobilities(inertia: Array, rows: Array) -> Array:
                 white[j, c] -= root[j, k] * white[k, c]
         for c in range(count):
             white[j, c] /= root[j, j]
-    across = np.zeros((count + 3, size))
+    across = np.empty((count, size))
     for c in range(count):
         for j in range(size):
             across[c, j] = white[j, c]
-    for c in range(0, count, 4):  # four at a time: each value is read once for them
-        for d in range(c, count):
-            one, two, three, four = 0.0, 0.0, 0.0, 0.0
-            for j in range(size):
-                value = across[d, j]
-                one += across[c, j] * value
-                two += across[c + 1, j] * value
-                three += across[c + 2, j] * value
-                four += across[c + 3, j] * value
-            found[d, c] = found[c, d] = one
-            if c + 1 < count:
-                found[d, c + 1] = found[c + 1, d] = two
-            if c + 2 < count:
-                found[d, c + 2] = found[c + 2, d] = three
-            if c + 3 < count:
-                found[d, c + 3] = found[c + 3, d] = four
+    gram(across, across, count, found)
+    for c in range(count):
+        for d in range(c):
+            found[d, c] = found[c, d]
     return found
 
 

@@ -157,10 +157,6 @@ class Recursion:
             self._key(frame)
             if self._ended():
                 return
-        for frame in reversed(corrected[:-1]):
-            if self._run.ended:
-                return
-            self._again(frame)
         self.keys.update(points)
         for frame in corrected:
             if frame not in self.stuck:
@@ -211,15 +207,6 @@ class Recursion:
         self.bad[frame] = False
         self.keys.add(frame)
         return True
-
-    def _again(self, frame: int) -> None:
-        """Predict an evaluation point that went far from the side of the points after it, which were not known then."""
-        if frame in self.stuck or self._predictor.farthest(frame, self.q[frame]) <= FAR:
-            return
-        for start in self._beside(frame)[-1:]:
-            found = self._predicted(frame, start, [], self._short)
-            if found.good and self._predictor.effort(frame, found.q) < self._predictor.effort(frame, self.q[frame]):
-                self.q[frame] = found.q
 
     def _swinging(self, frame: int) -> list[str]:
         """Frames with plane constraints on which no foot stands: what stands is held, and need not be in the plane."""
