@@ -363,6 +363,16 @@ def test_a_method_of_ones_own_reaches(example: Example, capsys: Any) -> None:
     assert capsys.readouterr().out.count(": solved ") == 2
 
 
+def test_people_of_nearly_one_stature_lift_a_box_alike(example: Example) -> None:
+    """They stood and held it otherwise, a shoulder turned by 113 degrees, where palms could be anywhere on the sides."""
+    box, found = example("lift_a_box"), []
+    for options in wb.people(percentiles=[15, 17], sex="male").values():
+        problem = box.build(wb.load("human", **options))
+        taken = wb.solve(problem)
+        found.append([taken.q[7:], box.lift(taken, problem)[1].q[7:]])
+    assert np.abs(np.subtract(*found)).max() < np.radians(10.0)
+
+
 def test_takes_a_seat_and_lifts_a_box(example: Example, solved: Any, tmp_path: Path) -> None:
     problem, solution = solved(example("take_a_seat"))
     assert solution.status == "solved"
