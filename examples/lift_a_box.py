@@ -23,6 +23,8 @@ def build(figure: wb.Figure | None = None) -> wb.Problem:
         scene,
         goals=[
             *(wb.Grasp(side, "box", kind="palm") for side in ("left", "right")),
+            # In the middle of the sides: palms that may be at its edges lift it otherwise from person to person.
+            *(wb.Point(f"{side}_palm", (0.45, y, 0.86)) for side, y in (("left", 0.16), ("right", -0.16))),
             # Hands turn with the box: fingers that hang as it is taken have wrists at their end as it is lifted.
             *(wb.Axis(f"{side}_palm", (1, 0, 0), direction=(1, 0, 0), weight=0.1) for side in ("left", "right")),
         ],

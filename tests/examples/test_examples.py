@@ -363,6 +363,15 @@ def test_a_method_of_ones_own_reaches(example: Example, capsys: Any) -> None:
     assert capsys.readouterr().out.count(": solved ") == 2
 
 
+def test_a_box_does_not_tip_between_palms(example: Example) -> None:
+    """The line from palm to palm goes through its centre of mass; palms were at the edges, 0.12 m away."""
+    box = example("lift_a_box")
+    problem = box.build()
+    at = places(problem, wb.solve(problem).q)
+    middle = 0.5 * (at("left_palm").translation + at("right_palm").translation)
+    assert middle == pytest.approx(box.ON_TABLE, abs=1e-3)
+
+
 def test_takes_a_seat_and_lifts_a_box(example: Example, solved: Any, tmp_path: Path) -> None:
     problem, solution = solved(example("take_a_seat"))
     assert solution.status == "solved"

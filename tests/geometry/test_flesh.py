@@ -25,10 +25,24 @@ def between_rails(figure: wb.Figure, gap: float, flexion: float) -> float:
 
 
 @pytest.mark.parametrize("detail", ["capsules", "hulls"])
-def test_passages_are_as_wide_as_hips_that_stand_and_seats_as_hips_that_sit(detail):
+def test_passages_are_as_wide_as_hips_that_stand_and_seats_as_hips_that_sit(detail: str) -> None:
     figure = wb.load("human", sex="female", detail=detail)
     size = measure(figure)
     assert size["hip_breadth_sitting"] > size["hip_breadth"] + 0.03
     for gap in (size["hip_breadth"], size["hip_breadth_sitting"]):
         for flexion, breadth in ((0.0, "hip_breadth"), (0.5, "hip_breadth"), (np.pi / 2, "hip_breadth_sitting")):
             assert between_rails(figure, gap, flexion) == pytest.approx(0.5 * (gap - size[breadth]), abs=2e-4)
+
+
+def test_flesh_of_one_of_two_people_spreads_alone() -> None:
+    figure = wb.load("human")
+    scene = wb.Scene({"anna": figure, "bert": (figure, (3.0, 0.0, 0.0))})
+    q = scene.figure.with_joints(pin.neutral(scene.model), {"bert/left_hip_flexion": 1.5})
+    placed = dict(zip(scene.piece_names, scene.workspace().placements(q), strict=True))
+
+    def out(name: str) -> float:
+        """How far flesh is from the piece in which it is otherwise."""
+        return float(np.abs(placed[f"{name}_thigh:3"] - placed[f"{name}_thigh:0"]).max())
+
+    assert out("bert/left") > 0.01
+    assert max(out("bert/right"), out("anna/left"), out("anna/right")) == 0.0

@@ -15,6 +15,7 @@ from wholebody.base.arrays import Array, Mask, brief, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.state import State, Wrench
+from wholebody.geometry.flesh import flesh_of
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, filled
@@ -157,6 +158,8 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str,
     data = scene.model.createData()
     placed = pin.GeometryData(scene.geometry)
     pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
+    for one in flesh_of(scene.model, scene.geometry):
+        placed.oMg[one.piece] = one.placed(scene.geometry, data.oMi)
     ahead = (target - eyes) / distance
     turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), ahead).matrix()
 

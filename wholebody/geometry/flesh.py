@@ -37,13 +37,6 @@ class Flesh(NamedTuple):
     trunk: int  # where the axis begins that is along it when the limb is straight, of a piece of what carries the limb
     sign: float  # of their product when the limb is straight
 
-    def spread(self, placed: Any) -> float:
-        """How far it is spread, from 0 to 1; `placed` are the flat placements of the pieces."""
-        limb, trunk = self.limb, self.trunk
-        cosine = placed[limb] * placed[trunk]
-        cosine += placed[limb + 1] * placed[trunk + 1] + placed[limb + 2] * placed[trunk + 2]
-        return _share(self.sign * cosine)
-
     def placed(self, geometry: pin.GeometryModel, joints: Any) -> pin.SE3:
         """Where it is in the world, with the joints at Pinocchio's placements."""
         trunk, column = divmod(self.trunk, NUMBERS)
@@ -60,6 +53,18 @@ def _share(cosine: float) -> float:
     if share <= 0.0 or share >= 1.0:
         return 0.0 if share <= 0.0 else 1.0
     return share * share * (3.0 - 2.0 * share)
+
+
+def spread(flesh: tuple[Flesh, ...], placed: Array, flat: Any) -> None:
+    """Move flesh among placements (n, 4, 3) of the pieces; `flat` is a memoryview of their numbers, which is fast."""
+    for piece, limb, trunk, sign in flesh:
+        cosine = flat[limb] * flat[trunk] + flat[limb + 1] * flat[trunk + 1] + flat[limb + 2] * flat[trunk + 2]
+        cosine *= sign
+        if cosine >= STRAIGHT:
+            begin = NUMBERS * piece
+            flat[begin : begin + NUMBERS] = flat[begin - NUMBERS : begin]
+        elif cosine > BENT:
+            placed[piece] = between(placed[piece - 1], placed[piece], _share(cosine))
 
 
 def flesh_of(model: pin.Model, geometry: pin.GeometryModel) -> tuple[Flesh, ...]:

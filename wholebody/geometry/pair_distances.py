@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.flesh import NUMBERS, Flesh, between, flesh_of
+from wholebody.geometry.flesh import Flesh, flesh_of, spread
 from wholebody.geometry.memory_views import (
     RESULT_FIELDS,
     computed_first,
@@ -65,6 +65,7 @@ class PairDistances:
         self._guesses = guess_view(data.distanceRequests)
         self._single = SinglePairs(geometry)
         self._flesh: tuple[Flesh, ...] | None = None
+        self._flat: Any = None  # memoryview of the numbers of `placed`
 
     def _copied(self) -> Array:
         return np.array([[*at.rotation.T, at.translation] for at in self.data.oMg], dtype=float).reshape(-1, 4, 3)
@@ -83,28 +84,21 @@ class PairDistances:
         pin.updateGeometryPlacements(model, data, self.geometry, self.data)
         if not self._viewed:
             self.placed = self._copied()
-        if self._flesh is None:
-            self._flesh = flesh_of(model, self.geometry)
-        if self._flesh:
-            self._spread(self._flesh)
+        flesh = self._flesh
+        if flesh is None:
+            flesh = self._flesh = flesh_of(model, self.geometry)
+        if flesh:
+            if not self._viewed or self._flat is None:
+                self._flat = self.placed.data.cast("B").cast("d")
+            spread(flesh, self.placed, self._flat)
+            for piece, *_ in () if self._viewed else flesh:
+                self.data.oMg[piece] = pin.SE3(self.placed[piece, :3].T, self.placed[piece, 3])
 
     def put(self, placements: Array) -> None:
         """Put the pieces to placements (n, 4, 3)."""
         self.placed[:] = placements
         for k, rows in () if self._viewed else enumerate(placements):
             self.data.oMg[k] = pin.SE3(rows[:3].T, rows[3])
-
-    def _spread(self, flesh: tuple[Flesh, ...]) -> None:
-        """Move flesh to where it is as its limbs are bent."""
-        flat = self.placed.data.cast("B").cast("d")
-        for one in flesh:
-            share, piece = one.spread(flat), one.piece
-            if share == 0.0:
-                flat[NUMBERS * piece : NUMBERS * (piece + 1)] = flat[NUMBERS * (piece - 1) : NUMBERS * piece]
-            elif share < 1.0:
-                self.placed[piece] = between(self.placed[piece - 1], self.placed[piece], share)
-            if not self._viewed:
-                self.data.oMg[piece] = pin.SE3(self.placed[piece, :3].T, self.placed[piece, 3])
 
     def measured(self, numbers: Indices) -> Array:
         """Distance, normal, and nearest points on both pieces (k, 10) of the pairs with these numbers (k,)."""
