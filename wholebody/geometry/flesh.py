@@ -7,6 +7,7 @@ place to the other. Contact rows leave this motion out: 16 mm while a hip bends 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,6 +66,17 @@ def spread(flesh: tuple[Flesh, ...], placed: Array, flat: Any) -> None:
             flat[begin : begin + NUMBERS] = flat[begin - NUMBERS : begin]
         elif cosine > BENT:
             placed[piece] = between(placed[piece - 1], placed[piece], _share(cosine))
+
+
+def beside_limbs(pieces: Sequence[pin.GeometryObject], reach: Array) -> Array:
+    """(n,) most that pieces of reach (n,) move a radian beside what their joints move them by, m: 0 but for flesh."""
+    most, rate = np.zeros(len(pieces)), 1.5 / (STRAIGHT - BENT) * np.sqrt(1.0 - BENT**2)  # of the share, a radian
+    for k, piece in enumerate(pieces):
+        if piece.meshPath == SPREADS:
+            moved = pieces[k - 1].placement.actInv(piece.placement)
+            turned = np.linalg.norm(moved.rotation - np.eye(3), 2)
+            most[k] = rate * (np.linalg.norm(moved.translation) + turned * reach[k])
+    return most
 
 
 def flesh_of(model: pin.Model, geometry: pin.GeometryModel) -> tuple[Flesh, ...]:

@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import number
 from wholebody.base.compiled import with_loops
+from wholebody.geometry.flesh import beside_limbs
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
 from wholebody.geometry.pair_distances import PairDistances
@@ -100,7 +101,8 @@ class PairTable:
         swept: the swept points of every piece.
         pairs: (pairs, 2) indices of the two pieces of every collision pair.
         joint: (n,) joint that carries each piece; 0 is the world.
-        reach: (n,) radius of each piece about its origin, metres; infinite for a half-space.
+        reach: (n,) radius of each piece about its origin, metres; infinite for a half-space. That of flesh is larger by
+            what it moves a radian beside its limb, so that bounds of motions hold for it.
         half: (n, 3) half the size of a box about each piece's origin, along its own axes, metres.
         widths: (pairs,) width of both pieces together, metres.
         points: (m, 3) swept points of all pieces, one piece after the other, each in its piece's frame.
@@ -125,7 +127,8 @@ class PairTable:
         self.swept = swept_points_of([piece.geometry for piece in pieces]) if swept is None else swept
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
-        self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
+        reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
+        self.reach = reach + beside_limbs(pieces, reach)
         self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         first, second = self.pairs.T
