@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack
+from scipy.sparse import csgraph
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
@@ -170,12 +171,13 @@ class _Matrices:
     """
 
     def __init__(self, program: BandedQP) -> None:
-        P, G = sp.csc_array(program.P), sp.csc_array(program.G)
+        P, G = sp.csc_array(program.P), sp.csc_array(program.G, copy=True)  # else zeros would leave the given one too
         G.eliminate_zeros()
         self.P, self.G, self.transposed = sp.csr_array(P), sp.csr_array(G), sp.csr_array(G.T)
         slack = _slacks(P, G, np.isinf(program.most))
         self.slack: Indices = np.flatnonzero(slack).astype(np.intp)
-        self.band: Indices = np.flatnonzero(~slack).astype(np.intp)
+        band = np.flatnonzero(~slack).astype(np.intp)
+        self.band: Indices = band[np.argsort(_parts(P, G)[band], kind="stable")]
         self.share = sp.csc_array(G[:, self.slack])
         self.rows = sp.csr_array(G[:, self.band])
         self.rows.sort_indices()
@@ -184,6 +186,7 @@ class _Matrices:
         self._spans()
         self._groups()
         inner = sp.coo_array(P[self.band][:, self.band])
+        inner.eliminate_zeros()  # of figures that equalities could couple, and do not
         at, to = inner.coords
         width = max(int((at - to).max(initial=0)), self._widest) + 1
         self._base = np.zeros((len(self.band), width))
@@ -282,6 +285,14 @@ class _Newton(NamedTuple):
         change = bounds.times(matrices.G @ dz, dz)
         ds = change + self.missed
         return dz, change, ds, -(products + y * ds) / s
+
+
+def _parts(P: Any, G: Any) -> Indices:
+    """(n,) the part of each unknown; parts share no row: of two figures that do not meet, the band is half as wide."""
+    coupled = sp.block_array([[P, G.T], [G, None]], format="csr")
+    coupled.eliminate_zeros()
+    labels: Indices = csgraph.connected_components(coupled, directed=False)[1][: P.shape[0]]
+    return labels
 
 
 def _slacks(P: Any, G: Any, unbounded: Mask) -> Mask:
