@@ -189,6 +189,17 @@ def test_a_hand_on_an_arm(alone: dict[str, wb.Figure]) -> None:
     assert all(frozenset((base, f"hand/{segment}")) in tested for segment in hand.segments if "distal" in segment)
 
 
+def test_the_arm_is_a_part_of_the_fingers_of_a_hand_on_it(alone: dict[str, wb.Figure]) -> None:
+    arm, place = alone["arm"], np.array((0.45, 0.15, 0.4))
+    tip = next(iter(arm.chains.values())).tip
+    made = arm.mounted(wb.load("hand"), on=tip, name="hand", at=(0.0, 0.0, 0.12))
+    limb = next(iter(arm.chains.values())).joints
+    assert all(chain.joints[: len(limb)] == limb for name, chain in made.chains.items() if name.startswith("hand/"))
+    found = wb.solve(wb.Problem(wb.Scene(made), goals=[wb.Point("hand/right_index_tip", place)]), method="ccd")
+    assert found.status == "solved"  # the finger alone left 983 mm
+    assert made.placement(found.q, "hand/right_index_tip").translation == pytest.approx(place, abs=2e-3)
+
+
 def test_penetration_between_figures_is_that_of_coal(alone: dict[str, wb.Figure]) -> None:
     scene = wb.Scene({"anna": alone["anna"], "ben": (alone["ben"], (0.12, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0))})
     q = scene.figure.neutral

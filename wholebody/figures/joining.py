@@ -77,10 +77,22 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
     postures = {one: partial(_mounted_posture, posture=one, **held) for one in base.postures}
     rest = _on_model(model, posture=base.postures[0], **held)
     tested, excluded = _pairs_of_mount(model, _geometry(parts, []), parts, rest)
-    known = _merged(parts)
+    known, carrying = _merged(parts), _carrying(base, frame)  # what carries it is a part of its limbs
+    limbs = {prefix + name for name in figure.chains}
+    chains = {
+        name: Chain((*carrying, *one.joints), one.tip) if name in limbs else one for name, one in known.chains.items()
+    }
     person = base.describe().person
-    description = with_values(known, postures=postures, excluded=(*known.excluded, *excluded), person=person)
+    excluded = (*known.excluded, *excluded)
+    description = with_values(known, postures=postures, chains=chains, excluded=excluded, person=person)
     return model, _geometry(parts, [tested]), description, _visual(parts)
+
+
+def _carrying(base: Articulated, frame: int) -> tuple[str, ...]:
+    """The joints of the limb on which a frame is, from the root outwards to it; none where it is on no limb."""
+    carrier = base.model.names[base.model.frames[frame].parentJoint]
+    limbs = (tuple(joints) for joints, _ in base.chains.values() if carrier in joints)
+    return next((joints[: joints.index(carrier) + 1] for joints in limbs), ())
 
 
 def _told_apart(model: pin.Model) -> pin.Model:

@@ -46,6 +46,8 @@ def test_needles_met_at_nearly_the_same_share_are_told_once(planar_arm: Callable
 class Asked:
     """Looks at frames of one degree of freedom: a share of its deviation is to be at least `least` metres."""
 
+    tree = np.zeros(1, dtype=np.intp)
+
     def __init__(self, least: float, share: float) -> None:
         self.least, self.share = least, share
 

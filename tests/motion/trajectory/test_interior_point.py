@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,11 @@ PRICE = 1e3
 def minimise(*given: Any) -> Answer:
     """The answer of a program, its fields one after the other."""
     return interior_point.minimise(BandedQP(*given))
+
+
+def minimise_well(*given: Any) -> Answer:
+    """The same, nearer to the optimum."""
+    return interior_point.minimise(BandedQP(*given), 1e-8, 1e-11)
 
 
 def program(seed: int, fixed: bool = True, contradicting: bool = False) -> BandedQP:
@@ -146,6 +152,35 @@ def test_unknowns_without_bounds_are_found() -> None:
     answer = minimise(eye, np.array([-2.0, -2.0]), none, *[np.zeros(0)] * 2, -bound, bound, None)
     assert answer.solved
     np.testing.assert_allclose(answer.z, [2.0, 0.5], atol=1e-5)
+
+
+def test_two_figures_that_do_not_meet_cost_as_much_as_two_programs() -> None:
+    """Frames of both have their unknowns by turns; no row has some of both."""
+    rng, frames, size = np.random.default_rng(0), 60, 40
+    coupled = sp.kron(sp.diags([2.0, -0.9, -0.9], [0, 1, -1], shape=(frames, frames)), sp.eye(2 * size))
+    rows = [np.zeros((2, 2 * size)) for _ in range(frames)]
+    for row in rows:
+        row[0, :size], row[1, size:] = rng.normal(size=(2, size))
+    count = 2 * size * frames
+    program = (
+        sp.csc_matrix(coupled), rng.normal(size=count), sp.csc_matrix(sp.block_diag(rows)), np.full(2 * frames, 0.1),
+        np.full(2 * frames, np.inf), np.full(count, -2.0), np.full(count, 2.0),
+    )  # fmt: skip
+    tracemalloc.start()
+    answer = minimise_well(*program, None)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert answer.solved
+    assert peak < 2.5 * 8 * count * 2 * size  # bytes: the band and its copy; of both together it is twice as wide
+    one, other = np.arange(count).reshape(frames, 2, size).transpose(1, 0, 2).reshape(2, -1)
+    for own, first in ((one, 0), (other, 1)):
+        kept = np.arange(first, 2 * frames, 2)
+        P, c, G, lower, upper, least, most = program
+        alone = minimise_well(
+            sp.csc_matrix(P[own][:, own]), c[own], sp.csc_matrix(G[kept][:, own]), lower[kept], upper[kept], least[own],
+            most[own], None,
+        )  # fmt: skip
+        np.testing.assert_allclose(answer.z[own], alone.z, atol=1e-4)
 
 
 @pytest.mark.parametrize("rows", [0, 2])

@@ -33,7 +33,8 @@ def brought_back(
     none = np.zeros((0, 1))
     rows = [Rows(Node(k), np.zeros(0), (none,), np.zeros(0, dtype=np.intp), np.zeros(0), none) for k in range(frames)]
     none_kept = [np.zeros(0, dtype=bool)] * frames
-    step = Step(x, rows, np.zeros(1, dtype=np.intp), radius, 1.0, [np.zeros(0)] * frames, none_kept)
+    one = np.zeros(1, dtype=np.intp)
+    step = Step(x, rows, one, radius, 1.0, [np.zeros(0)] * frames, none_kept, one)
     limits = Limits(-wide if least is None else least, wide, *bounds)
     layout = lay_out(Objective(frames, np.ones(1), 0.0, DT, (False, False)), limits, step)
     return layout.deviations(minimise(layout.program, 1e-8, 1e-10).z, x)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.state import State
@@ -87,6 +88,7 @@ class NodeEvaluator:
         chart: the window's frames.
         clearance: least distance asked of every pair, metres.
         loads: of the window; None where they are not looked at.
+        tree: (nv,) the figure of each degree of freedom, from 0.
     """
 
     def __init__(
@@ -95,7 +97,7 @@ class NodeEvaluator:
     ) -> None:  # fmt: skip
         """Take what is needed; `terms` are the resolved constraints of each frame."""
         self.workspace, self.chart, self.clearance, self._terms = workspace, chart, clearance, terms
-        self.loads = loads
+        self.loads, self.tree = loads, trees(chart.model)
         self._known: dict[Node, tuple[Array, float, Rows]] = {}  # where each node was looked at last
 
     def nodes(self) -> list[Node]:
@@ -144,6 +146,15 @@ class NodeEvaluator:
         found = workspace.rows.rows(contacts, self.clearance)
         rows = workspace.state.rows(found.wrench, found.second, found.first)
         return found.gap - self.clearance, rows, found.contact
+
+
+def trees(model: pin.Model) -> Indices:
+    """(nv,) of each degree of freedom which of the joints on the world carries it, from 0: of several figures whose."""
+    carriers = np.zeros(model.njoints, dtype=np.intp)
+    for joint in range(1, model.njoints):
+        carriers[joint] = carriers[model.parents[joint]] or joint
+    numbers = np.unique(carriers[1:], return_inverse=True)[1]
+    return np.repeat(numbers, model.nvs.tolist()[1:]).astype(np.intp)
 
 
 def _split(term: Constraint | Goal, state: State) -> tuple[Array, Array, Array, Array]:

@@ -1,8 +1,8 @@
 """The program of one step of a trajectory: the objective, rows of all nodes, limits, speeds, a trust region.
 
 Unknowns, frame by frame: the deviations of the degrees of freedom that count, then the slacks of the frame's nodes. A
-missed contact has a slack of its own. The others of a node share one. So a program always has an answer: where contacts
-contradict each other, the sum of what is missed is least.
+missed contact has a slack of its own. The others of a figure at a node share one. So a program always has an answer:
+where contacts contradict each other, the sum of what is missed is least.
 """
 
 from __future__ import annotations
@@ -100,11 +100,13 @@ class Step(NamedTuple):
     penalty: float  # of a metre or radian of shortfall
     multipliers: Sequence[Array]  # of the equalities of each node
     kept: Sequence[Mask]  # for each node which of its rows the program gets
+    tree: Indices  # (nv,) the figure of each degree of freedom, from 0
 
 
 def lay_out(objective: Objective, limits: Limits, step: Step) -> Layout:
     """The program of a step."""
-    count, slacks = len(step.dofs), [_slacks(one, keep) for one, keep in zip(step.rows, step.kept, strict=True)]
+    count = len(step.dofs)
+    slacks = [_slacks(one, keep, step.tree) for one, keep in zip(step.rows, step.kept, strict=True)]
     per_frame = np.zeros(len(step.x), dtype=np.intp)
     for one, (_, number) in zip(step.rows, slacks, strict=True):
         per_frame[one.node.frame] += number
@@ -181,14 +183,18 @@ def likely(one: Rows, radius: float) -> Mask:
     return np.ones_like(near) if one.node.soft else near
 
 
-def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
-    """The slack of each kept row, from 0, and how many there are."""
+def _slacks(one: Rows, kept: Mask, tree: Indices) -> tuple[Indices, int]:
+    """The slack of each kept row, from 0, and how many there are; of figures (nv,)."""
     group = one.group[kept]
     missed = one.shortfalls[group] > 0.0 if len(group) else np.zeros(0, dtype=bool)
     own, place = np.unique(group[missed], return_inverse=True)
-    slack = np.full(len(group), len(own), dtype=np.intp)  # what is not missed shares the last one
+    slack = np.zeros(len(group), dtype=np.intp)
     slack[missed] = place
-    return slack, len(own) + int((~missed).any())
+    # what is not missed shares those of its figure: one slack of all would couple figures that do not meet
+    moved = np.any([part[kept][~missed] != 0.0 for part in one.parts], axis=0)
+    figures, shared = np.unique(tree[moved.argmax(axis=1)] if moved.size else tree[:0], return_inverse=True)
+    slack[~missed] = len(own) + shared
+    return slack, len(own) + len(figures)
 
 
 def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tuple[sp.csr_matrix, Array]:

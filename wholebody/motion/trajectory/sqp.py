@@ -200,7 +200,9 @@ class WindowProgram:
         kept = [mask & likely(one, filter_.radius) for one, mask in zip(here.rows, possible, strict=True)]
         solved = 0
         while True:
-            step = Step(here.x, here.rows, dofs, filter_.radius, filter_.penalty, multipliers, kept)
+            step = Step(
+                here.x, here.rows, dofs, filter_.radius, filter_.penalty, multipliers, kept, self._evaluator.tree
+            )
             layout = lay_out(self._objective, self._limits, step)
             x, solved = layout.deviations(minimise(layout.program).z, here.x), solved + 1
             left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]
