@@ -72,7 +72,8 @@ def test_feet_that_hang_over_an_edge_are_not_drawn_to_the_floor(human: wb.Figure
 
 def test_a_skeleton_whose_axes_do_not_turn_with_its_feet_keeps_their_directions(human: wb.Figure) -> None:
     """Places alone, as of markers: a person turns round by 180 degrees, and the axes of its joints stay."""
-    still, count = person(40, 1.1), 40
+    count = 50
+    still = dataclasses.replace(person(count, 1.1), dt=0.1)  # so slow that feet rest
     turns = np.array([pin.utils.rotate("z", np.pi * k / count) for k in range(count)])
     places_ = np.einsum("nij,nkj->nki", turns, still.positions)
     lengths = np.linalg.norm(still.offsets, axis=1)[:, None] * [1.0, 0.0, 0.0]
@@ -86,7 +87,7 @@ def test_a_skeleton_whose_axes_do_not_turn_with_its_feet_keeps_their_directions(
     assert np.median(angles(*flat_ones)) < 10.0
 
 
-@pytest.mark.parametrize(("time", "count"), [(0.15, 0), (0.3, 1)])
+@pytest.mark.parametrize(("time", "count"), [(0.2, 0), (0.4, 1)])
 def test_hands_that_pass_each_other_do_not_touch(time: float, count: int) -> None:
     motion = person(40)
     at = np.array(motion.positions)

@@ -19,7 +19,7 @@ NEARBY = 0.8  # m: ground farther away than a step says nothing of the height he
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
 SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
-TREMBLES = 0.01  # m: by which a point that rests goes to and fro, as markers do
+TREMBLES = 0.015  # m: by which a point that rests goes to and fro, as markers do
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 

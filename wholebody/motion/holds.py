@@ -29,7 +29,6 @@ BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet c
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyond an edge
 HANGS = 0.15  # m: what seems to rest and has all surfaces so far below it hangs, as legs do of who lies on an edge
-BENEATH = 0.15 * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # m: where a foot may bear
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -119,7 +118,6 @@ class Holds:
             rest
             for rest in ground.footholds
             if not any(one.role == rest.role and rest.first < one.end and one.first < rest.end for one in contacts)
-            and self._borne(rest)
         ]
         self._stands: list[list[Foothold | ThingContact]] = [
             [one for one in contacts if (one.role, one.share, one.base) == (point.role, point.share, point.base)]
@@ -133,15 +131,6 @@ class Holds:
         self._places: dict[tuple[int, int], Array] = {}
         self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
         self._let_go: set[tuple[int, int]] = set()  # the same of all runs, with what is too short to be held between
-
-    def _borne(self, rest: Foothold) -> bool:
-        """Whether a surface of the scene is near below a rest of the recording."""
-        if self._surface is None:
-            return True
-        level, at = self._scale * rest.height, self._scale * rest.place[:2]
-        found = [self._surface(np.array([*(at + beside), level + STEP])) for beside in BENEATH]
-        known = [below for below in found if below is not None]
-        return not known or max(known) > level - HANGS
 
     def lost(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> bool:
         """Whether points (h, 3) are too far from the things that they are to touch; these are let go of in the frame.
@@ -275,6 +264,11 @@ class Holds:
             places = [
                 self._place(number, stand, paths, shift, near) for stand, near in zip(around, nearest, strict=True)
             ]
+            borne = [k for k, stand in enumerate(around) if not self._hangs(number, stand, places[k])]
+            if not borne:
+                continue
+            around, nearest = [around[k] for k in borne], [nearest[k] for k in borne]
+            places = [places[k] for k in borne]
             on = [k for k, stand in enumerate(around) if stand.first - span < frame < stand.end + span - 1]
             if on:
                 goals[number] = places[on[0]]
@@ -294,6 +288,12 @@ class Holds:
             if not (down[number] or self.points[number].thing):
                 weights[number, 2] = 0.0  # contact says how high
         return goals, weights
+
+    def _hangs(self, number: int, stand: Foothold | ThingContact, place: Array) -> bool:
+        """Whether all surfaces of the scene below a place (3,) of a sole are far below where it rested."""
+        if self._surface is None or not (isinstance(stand, Foothold) and self.points[number].foot):
+            return False
+        return bool(place[2] < self._scale * stand.height - HANGS)
 
     def _swing(
         self, number: int, frame: int, nearest: list[int], places: list[Array], paths: Mapping[int, Array]
