@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -142,6 +143,37 @@ def test_descents_of_seven_joints_begin_at_the_least_effort_of_each_branch() -> 
     assert len(ends) > 20
     for end in ends:  # valleys are flat: some descents end beside a minimum
         assert min(abs(end.assessment.measure / one.assessment.measure - 1.0) for one in found) < 0.01
+
+
+def test_answers_of_seven_joints_are_minima() -> None:
+    """Motions that keep the tool of a Gen3 in place form curves; beside each answer there is more effort on its own."""
+    figure, ready = known_arm("gen3")
+    model, data = figure.model, figure.model.createData()
+    frame, kind = model.getFrameId("tool"), pin.ReferenceFrame.LOCAL
+
+    def jacobian(q: np.ndarray) -> np.ndarray:
+        return np.asarray(pin.computeFrameJacobian(model, data, q, frame, kind))
+
+    def beside(q: np.ndarray, step: float) -> np.ndarray:
+        """A posture at the other end of a small motion of the joints that keeps the tool in place."""
+        tool, motion = figure.placement(q, "tool"), np.linalg.svd(jacobian(q))[2][-1]
+        found = pin.integrate(model, q, step * motion)
+        for _ in range(10):
+            apart = pin.log6(figure.placement(found, "tool").actInv(tool)).vector
+            found = pin.integrate(model, found, np.linalg.pinv(jacobian(found)) @ apart)
+        assert np.linalg.norm(apart) < 1e-6
+        return np.asarray(found)
+
+    def effort(q: np.ndarray) -> float:
+        return float(figure.effort_weights @ pin.difference(model, ready, q) ** 2)
+
+    known = pin.integrate(model, pin.neutral(model), np.array((0.3, 1.1, -0.5, 1.4, 0.6, -0.9, 0.4)))
+    tool = figure.placement(known, "tool")
+    found = wb.solutions(wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", tool)]), most=100, starts=60)
+    assert len(found) > 5
+    assert not found.complete
+    for answer in found:
+        assert min(effort(beside(answer.q, step)) for step in (-0.1, 0.1)) > effort(answer.q) - 1e-4
 
 
 def test_parallel_axes_of_a_wrist_leave_postures_between_the_branches() -> None:

@@ -22,6 +22,9 @@ from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
+STAYED = 0.01  # rad, m: by which a descent moves less from a minimum
+SETTLING = 10  # most descents from the end of one; of arms of seven joints more than three are rare
+
 
 @dataclass(frozen=True)
 class Solutions(Sequence[Solution]):
@@ -123,11 +126,12 @@ def solutions(
         if left <= 0.0 and begun:
             break
         # the first descent begins however long it took to get here
-        method = QP(time_limit=None if time_limit is None else max(left, 1e-9))
-        answer = next(method.minima(problem, [start]))
+        answer = next(_method(time_limit, ends).minima(problem, [start]))
         begun += 1
         if answer.solved:
             descents += 1
+            if all(_difference(problem.scene.model, answer.q, one.q) >= apart for one in known):
+                answer = _settled(problem, answer, time_limit, ends)
             known = _with(problem, known, answer, apart)
         # After 12 descents minima at limits, which few starts lead to, were missed.
         complete = begun == len(branches) if every else all_found(len(known), descents, 40)
@@ -136,6 +140,24 @@ def solutions(
     complete = complete and _stand_alone(problem, [answer.q for answer in known])
     ordered = sorted(known, key=lambda answer: answer.assessment.measure)
     return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
+
+
+def _method(time_limit: float | None, ends: float) -> QP:
+    """The method of a descent that ends when the search does."""
+    return QP(time_limit=None if time_limit is None else max(ends - time.perf_counter(), 1e-9))
+
+
+def _settled(problem: Problem, answer: Solution, time_limit: float | None, ends: float) -> Solution:
+    """The end of descents from an answer and from their ends in turn, until one stays where it begins.
+
+    Where neighbours of an answer meet the goals, a descent can end beside a maximum of the measures among them.
+    """
+    for _ in range(SETTLING):
+        after = next(_method(time_limit, ends).minima(problem, [answer.q]))
+        if not after.solved or _difference(problem.scene.model, after.q, answer.q) < STAYED:
+            break
+        answer = after
+    return answer
 
 
 def _stand_alone(problem: Problem, postures: Iterable[Array]) -> bool:

@@ -56,7 +56,7 @@ class Geodesics:
         partial: whether one joint may move in another way than before, and all others as they did.
     """
 
-    searches: ClassVar[int] = 8  # how many paths are looked for, of which the shortest counts; more = shorter, later
+    searches: ClassVar[int] = 12  # how many paths are looked for, of which the shortest counts; more = shorter, later
     samples: ClassVar[int] = 600  # of trees that look for a shorter path after the first; more = shorter paths, later
     rounds: ClassVar[int] = 50  # samples of trees until they get another end
     tries: ClassVar[int] = 30  # shortcuts in a row that fail; more = shorter paths, later

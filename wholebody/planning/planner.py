@@ -38,8 +38,11 @@ KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
-AGAIN = 0.35  # of the time limit: for shorter paths; more = shorter, later
-POLISHED = 0.55  # of the time limit: the shortest path is drawn tight again until then
+AGAIN = 0.45  # of the time limit: for shorter paths; more = shorter, later
+STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
+LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
+LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
+POLISHED = 0.6  # of the time limit: the shortest path is drawn tight again until then
 TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
@@ -216,13 +219,13 @@ class _Search:
         self._bodily = free_root and self._local is not self._slides
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
-        self._straight = False
+        self._straight, self._until = False, AGAIN
 
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
         model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
-        enough = self._local.samples
-        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < AGAIN):
+        enough: float = self._local.samples
+        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
             # other motions are shorter than this share of the best one
             path, trees = self._path(0.95 * most, np.inf if not runs else enough - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
@@ -238,6 +241,9 @@ class _Search:
                 best, most = path, found
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
+            straight = min(self._apart(self._problem.start, q) for q in self._reached)
+            long = self._local is not self._slides and not self._bodily and most > LONG * straight
+            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
             before = np.inf
             while self._local is not self._slides and most < TIGHT * before and BUDGET.spent < POLISHED:
@@ -262,11 +268,13 @@ class _Search:
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
         sliding = self._problem.scene.figure.roots and self._local is not self._slides
-        trees = RRTConnect(self._local, self._slides if sliding else None, model, start)
+        trees = RRTConnect(
+            self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
+        )
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
-        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else AGAIN) or not self._begun):
+        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else self._until) or not self._begun):
             self._begun = True
             if rounds % self._local.rounds == 0 or not ends:
                 q, why = next(self._ends, (None, ""))
@@ -331,9 +339,12 @@ class _Judge:
 
     def __init__(self, problem: Problem, pace: Pace) -> None:
         self.problem, self._pace = problem, pace
-        began = _computed()
-        assess(problem, problem.start)
-        self._frame = 3.0 * (_computed() - began)  # s: each is also swept from the one before
+        spent = []
+        for _ in range(3):  # the least, as a busy machine takes several times as long now and then
+            began = _computed()
+            assess(problem, problem.start)
+            spent.append(_computed() - began)
+        self._frame = 3.0 * min(spent)  # s: each is also swept from the one before
 
     def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""

@@ -52,17 +52,18 @@ class RRTConnect:
     """A tree from the start and one from the ends, which `local` lets grow, and `slides` where that is blocked at once.
 
     So branches towards samples go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008):
-    a root is pulled to its place in a sample, and all else gives way, which leads out of narrow places.
+    a root is pulled to its place in a sample, and all else gives way, which leads out of narrow places. Paths
+    without steps are shorter.
 
     Attributes:
         samples: how many they were extended towards.
     """
 
     def __init__(
-        self, local: LocalPlanner, slides: TrackedMotions | None, model: pin.Model, start: Array
+        self, local: LocalPlanner, slides: TrackedMotions | None, model: pin.Model, start: Array, every: int
     ) -> None:  # fmt: skip
-        """Take the posture (nq,) at which the motion begins."""
-        self._local, self._slides = local, slides
+        """Take the posture (nq,) at which the motion begins; `every` how many samples steps are tried once."""
+        self._local, self._slides, self._every = local, slides, every
         self._trees = [Tree(model, start, local.shares), Tree(model, start, local.shares)]
         self._trees[0].add(start)
         self.samples = 0
@@ -81,7 +82,7 @@ class RRTConnect:
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)
         there = 1 - here
-        number, _ = self._extend(self._trees[here], sample, self._slides)
+        number, _ = self._extend(self._trees[here], sample, self._slides if self.samples % self._every == 0 else None)
         if number is None:
             return None
         # steps towards what is behind a thing end at it, and cost as much as ten geodesics

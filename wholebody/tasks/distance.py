@@ -280,7 +280,7 @@ class Soft(SumOfSquares):
 
     Goals and constraints come first: where a preference cannot be met, or costs more than it is worth, the answer is
     solved all the same. The error that is left is ``problem.measures[k].goal.error(state)``. Of a preference
-    that stays far off "newton" converges slowly; take "qp".
+    that stays far off "newton" converges slowly; take "qp". "ccd" and "placo" refuse it, and "dls" leaves it out.
 
     Attributes:
         goal: any goal, such as `wb.Point("left_palm", place)`. Its weight is a factor too.

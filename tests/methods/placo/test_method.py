@@ -168,6 +168,7 @@ def test_an_object_that_moved_is_avoided_where_it_is_now(planar_arm: Callable[..
         ({"constraints": [wb.Plane("right_hand", (0, 0, 1), side="above")]}, "Plane"),
         ({"goals": [wb.Axis("head", (1, 0, 0), toward=(2, 0, 1))]}, "Axis"),
         ({"measures": [wb.tasks.PotentialEnergy()]}, "PotentialEnergy"),
+        ({"measures": [wb.Soft(wb.Point("head", (0.1, 0.0, 1.6)))]}, "Soft.*give way"),
         ({"measures": [wb.Effort(), wb.tasks.Discomfort()]}, r"measures\[1\], Discomfort"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -24,6 +24,7 @@ REASONS = {
     "CenterOfMass": "placo's is of all figures together",
     "Plane": "placo has no half-spaces for frames",
     "ReachCones": "placo's cones are circular",
+    "Soft": "goals would give way to it, as placo weighs them against each other",
 }
 """Reasons of refusals that the name of the term's class does not explain."""
 
