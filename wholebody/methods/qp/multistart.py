@@ -94,7 +94,7 @@ class Multistart(Search):
         start, least, tried = self._start, self._least, self.tried
         self._first = len(self.trace)
         yield Attempt(self._before_contact(), self._into_contact, "from before contact")
-        yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
+        yield Attempt(self._before_contact(grips=True), self._gripping, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
         self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
         self.out_of_reach = self._seems_out_of_reach(self.best.q)
@@ -166,11 +166,22 @@ class Multistart(Search):
 
     def _closing(self, start: Array) -> LocalSolution | None:
         """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
-        for q in self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start)):
+        for q in self._hooked(start):
             local = self._relaxed(q)
             if local is not None and self._accept(local, "from hooked hands"):
                 return local
         return self.feasibility_first(start)
+
+    def _gripping(self, start: Array) -> LocalSolution | None:
+        """Close hands from before a grip, first so that nothing else changes sides."""
+        for q in self._hooked(start) or [start]:
+            if self._accept(local := self._free(q), "from before a grip"):
+                return local
+        return self._closing(start)
+
+    def _hooked(self, start: Array) -> list[Array]:
+        """The start with hooked fingers."""
+        return [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
 
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
