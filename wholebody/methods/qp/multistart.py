@@ -195,6 +195,8 @@ class Multistart(Search):
         """A probe with the true clearances, and a descent from where it reaches the goals; `other` is (nq,)."""
         tolerance = self.settings.tolerance
         probe = self._probe(start, 0.0)
+        if tolerance < probe.violation.total <= SEARCH.on_its_way and not probe.converged:
+            probe = self._probe(probe.q, 0.0)
         if other is not None and not held(probe, tolerance) and not held(self.best, tolerance):
             probe = self._probe(other, 0.0)  # nothing leads out from there; to be outside comes before the goals
         if probe.violation.worst > tolerance:
@@ -226,12 +228,16 @@ class Multistart(Search):
             before = self.best.measure
             gains = self._accept(self._descend(self.best.q), self.how) and self.best.measure < SEARCH.moved * before
 
+    @property
+    def _touches(self) -> bool:
+        """Whether a term is a contact."""
+        return any(hasattr(term, "touches") for term in (*self.problem.goals, *self.problem.constraints))
+
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
         # At a kink two points touch at once; the point that counts as the contact should leave.
         problem, tolerance = self.problem, self.settings.tolerance
-        touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
-        if not (touches and self.settings.measures and self.best.violation.worst <= tolerance):
+        if not (self._touches and self.settings.measures and self.best.violation.worst <= tolerance):
             return False
         while self._to_the_place():
             pass
@@ -245,32 +251,44 @@ class Multistart(Search):
             self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _around_things(self) -> list[Array]:
-        """Two starts (nq,) that lead around things where these make the measures dear; else none."""
-        tolerance, most = self.settings.tolerance, self._at_most(SEARCH.probe_programs)
-        if not self.settings.restarts or self.best.measure <= SEARCH.dear * self._through_measure:
-            return []
-        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        through = self._ran(SQP(alone, tolerance, most, "through things"), self.best.q)
-        dear = through.violation.worst <= tolerance and self.best.measure > SEARCH.dear * through.measure
-        return [through.q, self._start] if dear else []
-
     def _seek_lower(self, count: int) -> None:
-        """Where all is met, seek `count` lower minima, and one around things, from the best of feasible postures."""
-        tolerance, found = self.settings.tolerance, list[LocalSolution]()
-        if not self.settings.measures or self.best.violation.worst > tolerance:
+        """Where all is met, seek lower minima: from one other start, from `count`, or from more among things."""
+        if not (self.settings.measures and self.problem.measures) or self.best.violation.worst > self.settings.tolerance:
             return
-        starts, rng = self._around_things(), np.random.default_rng([self.settings.seed, count])
-        most = count + bool(starts)
-        if count:
-            given = self.problem, self.lineariser.state, self._start, rng, SEARCH.screened * count - 1
-            starts = [*(starts or [self._start]), *restarts(*given)]
-        for q in starts:
-            local = None if self.control.over else self._through_things(q, "for measure")
-            if local is not None and local.violation.worst <= tolerance:
-                found.append(local)
-        for local in sorted(found, key=lambda each: each.measure)[:most]:
-            self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
+        least, tried = self._through_measure, 0
+        if self.settings.restarts and not least:
+            least, tried = self._below_things()
+        # a descent to a contact takes ten times as long
+        most = max(count, self.settings.restarts)
+        count = max(count, 1 - tried if self.settings.restarts and not self._touches else 0)
+        rng = np.random.default_rng([self.settings.seed, count])
+        for number, q in enumerate(restarts(self.problem, self.lineariser.state, self._start, rng, most)):
+            dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
+            if number >= count + int(SEARCH.dear * dear) or self.control.over:
+                break
+            self._lower(q)
+
+    def _below_things(self) -> tuple[float, int]:
+        """Seek lower minima beside those through things; the least measures there, 0 if unknown, and starts tried."""
+        tolerance, least, tried = self.settings.tolerance, np.inf, 0
+        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
+        for q in (self.best.q, self._start):
+            through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), q)
+            if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
+                least = through.measure
+                if least < SEARCH.less * self.best.measure and not self.control.over:
+                    tried += 1
+                    self._lower(through.q)
+        return (least if np.isfinite(least) else 0.0), tried
+
+    def _lower(self, start: Array) -> None:
+        """Seek feasibility from a start, and descend from there as long as the measures may come below the least."""
+        local = self._through_things(start, "for measure")
+        if local is None or local.violation.worst > self.settings.tolerance:
+            return
+        below = SEARCH.less * self.best.measure
+        lower = self._ran(self._descent(self.settings.iterations, None, "for measure", below=below), local.q)
+        self._accept(lower, "from a start for the measures")
 
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""
