@@ -286,9 +286,10 @@ class Multistart(Search):
         local = self._through_things(start, "for measure")
         if local is None or local.violation.worst > self.settings.tolerance:
             return
-        below = SEARCH.less * self.best.measure
-        lower = self._ran(self._descent(self.settings.iterations, None, "for measure", below=below), local.q)
-        self._accept(lower, "from a start for the measures")
+        descent = self._descent(self.settings.iterations, None, "for measure")
+        # far from the least measures, steps along curved constraints are short inside of a narrow funnel
+        descent.width, descent.below = SEARCH.width, SEARCH.less * self.best.measure
+        self._accept(self._ran(descent, local.q), "from a start for the measures")
 
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""

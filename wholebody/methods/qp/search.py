@@ -100,10 +100,10 @@ class Search:
 
     def _descent(
         self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, full_step: bool = False,
-        tolerance: float | None = None, below: float = np.inf,
+        tolerance: float | None = None,
     ) -> SQP:  # fmt: skip
         tolerance, measures = tolerance or self.settings.tolerance, measures and self.settings.measures
-        return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step, below)
+        return SQP(self._shared, tolerance, iterations, note, offset, measures, full_step)
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
         shared = with_values(self._shared, lineariser=lineariser)

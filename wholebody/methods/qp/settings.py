@@ -177,6 +177,7 @@ class SearchNumbers(NamedTuple):
     poor: int = 2  # starts for the measures where it is none after all. More: lower, slower.
     # starts that seek lower minima, for each factor e that things multiply the measures by. More: lower, slower.
     dear: float = 3.0
+    width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
     less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
 
 
