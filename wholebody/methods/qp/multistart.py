@@ -272,7 +272,9 @@ class Multistart(Search):
         """Seek lower minima beside those through things; the least measures there, 0 if unknown, and starts tried."""
         tolerance, least, tried = self.settings.tolerance, np.inf, 0
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        for q in (self.best.q, self._start):
+        for q in (self._start, self.best.q):
+            if least < self.best.measure:
+                break  # otherwise another minimum through things than beside them
             through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), q)
             if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
                 least = through.measure
