@@ -252,19 +252,27 @@ class Multistart(Search):
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _seek_lower(self, count: int) -> None:
-        """Where all is met, seek lower minima: from one other start, from `count`, or from more among things."""
-        if not (self.settings.measures and self.problem.measures) or self.best.violation.worst > self.settings.tolerance:
+        """Where all is met, seek lower minima: `count` from feasible postures; one more, and others among things."""
+        tolerance, measures = self.settings.tolerance, self.settings.measures and self.problem.measures
+        if not measures or self.best.violation.worst > tolerance:
             return
-        least, tried = self._through_measure, 0
-        if self.settings.restarts and not least:
-            least, tried = self._below_things()
-        # a descent to a contact takes ten times as long
-        most = max(count, self.settings.restarts)
-        count = max(count, 1 - tried if self.settings.restarts and not self._touches else 0)
-        rng = np.random.default_rng([self.settings.seed, count])
-        for number, q in enumerate(restarts(self.problem, self.lineariser.state, self._start, rng, most)):
+        given, found = (self.problem, self.lineariser.state, self._start), list[LocalSolution]()
+        others = restarts(*given, np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count - 1)
+        for q in chain([self._start], others) if count else ():
+            local = None if self.control.over else self._through_things(q, "for measure")
+            if local is not None and local.violation.worst <= tolerance:
+                found.append(local)
+        for local in sorted(found, key=lambda each: each.measure)[:count]:
+            self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
+        if not self.settings.restarts:
+            return
+        least, tried = (self._through_measure, 0) if self._through_measure else self._below_things()
+        more = int(not (tried or count or self._touches))  # a descent to a contact takes ten times as long
+        rng = np.random.default_rng([self.settings.seed, count + 1])
+        starts = restarts(*given, rng, self.settings.restarts)
+        for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
-            if number >= count + int(SEARCH.dear * dear) or self.control.over:
+            if number >= more + int(SEARCH.dear * dear) or self.control.over:
                 break
             self._lower(q)
 

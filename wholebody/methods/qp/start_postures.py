@@ -59,19 +59,18 @@ def before_contact(
     sides = any(isinstance(a, Touch) and a is not b for a, b in zip((*goals, *constraints), terms, strict=True))
     if not (grips or faces or (sides and not bars)):
         return
-    # The measures count: without contacts, they determine what the terms leave free.
-    alone = shared.lineariser.relaxed(SEARCH.rest_depth if sides else ENDLESS)
-    alone.take(goals, alone.clearances, constraints)
-    free = shared.lineariser.relaxed(0.0)
-    free.take(goals, free.clearances, constraints)
+    # The measures count: without contacts, they determine what the terms leave free. Where a point is to come to its
+    # side of a thing, limbs first go around that.
+    runs, figure = list[Run](), problem.scene.figure
+    for depth in (SEARCH.rest_depth, 0.0) if sides else (ENDLESS,):
+        lineariser = shared.lineariser.relaxed(depth)
+        lineariser.take(goals, lineariser.clearances, constraints)
+        runs.append(with_values(shared, lineariser=lineariser))
 
     def led(q: Array) -> LocalSolution:
-        # to 1 mm or mrad: what is exact there is not where surfaces meet
-        stages = [SQP(with_values(shared, lineariser=alone), 1e-3, 40, "before contact", full_step=True)]
-        if sides: # feet go around what they are to stand on
-            stages = [Feasibility(with_values(shared, lineariser=each), 1e-3, 40, "before contact", figure=problem.scene.figure) for each in (alone, free)]
-        for stage in stages:
-            local = stage.run(q)
+        for run in runs:  # to 1 mm or mrad: what is exact there is not where surfaces meet
+            given = run, 1e-3, 40, "before contact"
+            local = (Feasibility(*given, figure=figure) if sides else SQP(*given, full_step=True)).run(q)
             q = local.q
         return local
 
