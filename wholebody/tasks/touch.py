@@ -20,7 +20,7 @@ from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Made, Meeting, OwnSurface, Part, owner_pairs
 from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
 
-THICK = 0.05  # m: of a thicker thing no point gets to the far side by coming from there
+THICK = 0.1  # m: of a thicker thing no point gets to the far side
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 WITHIN_FACE = 1e-3  # m: and one on a face is within it if it is this far from all others
 
@@ -154,13 +154,16 @@ def on_its_side(term: Any, scene: Scene, state: State, distance: float) -> Any:
     part = term.parts[0] if isinstance(term, Touch) else None
     if not isinstance(part, Gap) or part.first.fixed is None or abs(part.rows(state)[0][0]) <= distance:
         return term
-    beyond = distance + min(THICK, max(each.width for each in part.second.swept))
+    thickness = max(each.width for each in part.second.swept)
+    if thickness > THICK:
+        return term
+    own = [each for each in scene.figure.segments if each in scene.piece_owner]
     for way in _faces_of(scene, part.first):
         ahead = [
             with_values(part.first, fixed=pin.SE3(fixed.rotation, fixed.translation + far * way))
-            for fixed, far in ((part.first.fixed, distance), (part.first.fixed, beyond))
+            for fixed, far in ((part.first.fixed, distance), (part.first.fixed, distance + thickness))
         ]
-        if all(nearest(ahead[0], surface(scene, each, each), state).distance > 0.0 for each in scene.figure.segments):
+        if all(nearest(ahead[0], surface(scene, each, each), state).distance > 0.0 for each in own):
             return filled(term, parts=(Gap(ahead[1], part.second),))
     return term
 
