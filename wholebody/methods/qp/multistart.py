@@ -272,7 +272,7 @@ class Multistart(Search):
         starts = restarts(*given, rng, self.settings.restarts)
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
-            if number >= more + int(SEARCH.dear * dear) or self.control.over:
+            if number >= more + (0 if self._touches else int(SEARCH.dear * dear)) or self.control.over:
                 break
             self._lower(q)
 
@@ -286,7 +286,8 @@ class Multistart(Search):
             through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), q)
             if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
                 least = through.measure
-                if least < SEARCH.less * self.best.measure and not self.control.over:
+                less = SEARCH.less_of_contacts if self._touches else SEARCH.less
+                if least < less * self.best.measure and not self.control.over:
                     tried += 1
                     self._lower(through.q)
         return (least if np.isfinite(least) else 0.0), tried

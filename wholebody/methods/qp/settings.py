@@ -180,6 +180,7 @@ class SearchNumbers(NamedTuple):
     dear: float = 3.0
     width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
     less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
+    less_of_contacts: float = 0.5  # the same where terms are contacts, whose descents take ten times as long
 
 
 class StepNumbers(NamedTuple):
