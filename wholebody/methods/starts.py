@@ -40,6 +40,12 @@ def restarts(problem: Problem, state: State, start: Array, rng: np.random.Genera
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 
+def halfway(problem: Problem, state: State, start: Array) -> Array:
+    """The start (nq,) half way to the middle of every joint's range: stretched limbs are bent. It moves the state."""
+    lower, upper = _ranges(problem, start)
+    return _moved(problem, state, start, 0.25 * (lower + upper))
+
+
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without."""
     figure, terms = problem.scene.figure, (*problem.goals, *problem.constraints)

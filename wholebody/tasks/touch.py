@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +20,7 @@ from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Made, Meeting, OwnSurface, Part, owner_pairs
 from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
 
+THICK = 0.1  # m: of a thicker thing no point gets to the far side
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 WITHIN_FACE = 1e-3  # m: and one on a face is within it if it is this far from all others
 
@@ -133,6 +135,44 @@ def _outwards(scene: Scene, point: Surface) -> Array | None:
         return None
     way = point.fixed.translation - own.middle.fixed.translation
     return np.asarray(point.fixed.rotation.T @ way / np.linalg.norm(way))
+
+
+def on_its_side(term: Any, scene: Scene, state: State, distance: float) -> Any:
+    """A resolved `Touch` whose point is to be in front of the thing by a distance [m]; a term of another kind stays.
+
+    The distance of a point does not tell the side: a sole that comes from below would end under a rung. What is asked
+    for instead is that a point in front of it touches the thing, farther out than that is thick.
+    """
+    part = term.parts[0] if isinstance(term, Touch) else None
+    if not isinstance(part, Gap) or part.first.fixed is None or abs(part.rows(state)[0][0]) <= distance:
+        return term
+    thickness = max(each.width for each in part.second.swept)
+    if thickness > THICK:
+        return term
+    own = [each for each in scene.figure.segments if each in scene.piece_owner]
+    for way in _faces_of(scene, part.first):
+        ahead = [
+            with_values(part.first, fixed=pin.SE3(fixed.rotation, fixed.translation + far * way))
+            for fixed, far in ((part.first.fixed, distance), (part.first.fixed, distance + thickness))
+        ]
+        if all(nearest(ahead[0], surface(scene, each, each), state).distance > 0.0 for each in own):
+            return filled(term, parts=(Gap(ahead[1], part.second),))
+    return term
+
+
+def _faces_of(scene: Scene, point: Surface) -> list[Array]:
+    """Normals (3,) of its pieces' surfaces on which a point is, in the axes of its joint."""
+    normal = _outwards(scene, point)
+    if normal is not None:
+        return [point.fixed.rotation @ normal]
+    found = list[Array]()
+    own = carried_by(scene, point.name, point.joints[0])
+    for index, swept in zip(own.pieces, own.swept, strict=True):
+        place = scene.geometry.geometryObjects[index].placement
+        behind = swept.faces[:, 3] - swept.faces[:, :3] @ place.actInv(point.fixed.translation)
+        if not swept.radius and behind.min(initial=np.inf) >= -ON_SURFACE:
+            found += [place.rotation @ normal for normal in swept.faces[behind <= ON_SURFACE, :3]]
+    return found
 
 
 def own_surface(scene: Scene, point: Surface) -> OwnSurface | None:

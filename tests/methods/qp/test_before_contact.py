@@ -9,6 +9,7 @@ import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.methods import control
 from wholebody.methods.qp.method import QP
+from wholebody.tasks.touch import on_its_side
 
 
 def test_feet_get_onto_a_board_that_they_begin_under() -> None:
@@ -56,3 +57,24 @@ def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
     assert quick.solved
     assert "before contact" in quick.message
     np.testing.assert_array_equal(quick.q, slow.q)
+
+
+def test_feet_get_onto_rungs_that_they_begin_under() -> None:
+    """Soles that came from below touched the rungs from there; a third of a person's starts ended so."""
+    scene = wb.Scene(wb.load("human"))
+    for number in (1, 2):
+        at = (0.3 + 0.07 * number, 0.0, 0.28 * number)
+        turned = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+        scene.add(wb.Cylinder(0.016, 0.42), name=f"rung{number}", at=(*at, *turned))
+    feet = [wb.Touch("left_ball", "rung1"), wb.Touch("right_ball", "rung2")]
+    problem = wb.Problem(scene, "standing", goals=feet)
+    with problem.borrow() as workspace:
+        state = workspace.state.update(problem.start)
+        for term in problem.goals:
+            ahead = on_its_side(term, scene, state, 0.01).parts[0].first.fixed.translation
+            way = ahead - term.parts[0].first.fixed.translation
+            np.testing.assert_allclose(way, (0.0, 0.0, -0.042), atol=1e-6)  # under the sole, by a rung and 1 cm
+    solution = wb.solve(problem, wb.methods.QP(measures=False, time_limit=30.0))
+    assert solution.solved, solution
+    for side, number in (("left", 1), ("right", 2)):
+        assert scene.figure.placement(solution.q, f"{side}_ball").translation[2] > 0.28 * number

@@ -45,8 +45,8 @@ class QP(Settings, Descends):
             about a millisecond.
         restarts: most seeded starts that are tried.
         restarts_for_measure: how many more descents look for a lower minimum of the measures once the goals are met;
-            four times as many feasible postures are found first, and the best of them are descended from. One more is
-            made where things double the measures, also with 0.
+            four times as many feasible postures are found first, and the best of them are descended from. Also with 0
+            one is made, and more where things make the measures dear, unless `restarts` is 0.
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.

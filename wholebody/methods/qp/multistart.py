@@ -94,7 +94,7 @@ class Multistart(Search):
         start, least, tried = self._start, self._least, self.tried
         self._first = len(self.trace)
         yield Attempt(self._before_contact(), self._into_contact, "from before contact")
-        yield Attempt(self._before_contact(grips=True), self._closing, "from before a grip")
+        yield Attempt(self._before_contact(grips=True), self._gripping, "from before a grip")
         yield Attempt([start], self._closing, "by feasibility first")
         self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
         self.out_of_reach = self._seems_out_of_reach(self.best.q)
@@ -166,11 +166,22 @@ class Multistart(Search):
 
     def _closing(self, start: Array) -> LocalSolution | None:
         """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
-        for q in self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start)):
+        for q in self._hooked(start):
             local = self._relaxed(q)
             if local is not None and self._accept(local, "from hooked hands"):
                 return local
         return self.feasibility_first(start)
+
+    def _gripping(self, start: Array) -> LocalSolution | None:
+        """Close hands from before a grip, first so that nothing else changes sides."""
+        for q in self._hooked(start) or [start]:
+            if self._accept(local := self._free(q), "from before a grip"):
+                return local
+        return self._closing(start)
+
+    def _hooked(self, start: Array) -> list[Array]:
+        """The start with hooked fingers."""
+        return [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
 
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
@@ -184,6 +195,8 @@ class Multistart(Search):
         """A probe with the true clearances, and a descent from where it reaches the goals; `other` is (nq,)."""
         tolerance = self.settings.tolerance
         probe = self._probe(start, 0.0)
+        if tolerance < probe.violation.total <= SEARCH.on_its_way and not probe.converged:
+            probe = self._probe(probe.q, 0.0)
         if other is not None and not held(probe, tolerance) and not held(self.best, tolerance):
             probe = self._probe(other, 0.0)  # nothing leads out from there; to be outside comes before the goals
         if probe.violation.worst > tolerance:
@@ -215,12 +228,16 @@ class Multistart(Search):
             before = self.best.measure
             gains = self._accept(self._descend(self.best.q), self.how) and self.best.measure < SEARCH.moved * before
 
+    @property
+    def _touches(self) -> bool:
+        """Whether a term is a contact."""
+        return any(hasattr(term, "touches") for term in (*self.problem.goals, *self.problem.constraints))
+
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
         # At a kink two points touch at once; the point that counts as the contact should leave.
         problem, tolerance = self.problem, self.settings.tolerance
-        touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))
-        if not (touches and self.settings.measures and self.best.violation.worst <= tolerance):
+        if not (self._touches and self.settings.measures and self.best.violation.worst <= tolerance):
             return False
         while self._to_the_place():
             pass
@@ -234,32 +251,56 @@ class Multistart(Search):
             self._accept(local, self.how)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
-    def _around_things(self) -> list[Array]:
-        """Two starts (nq,) that lead around things where these make the measures dear; else none."""
-        tolerance, most = self.settings.tolerance, self._at_most(SEARCH.probe_programs)
-        if not self.settings.restarts or self.best.measure <= SEARCH.dear * self._through_measure:
-            return []
-        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        through = self._ran(SQP(alone, tolerance, most, "through things"), self.best.q)
-        dear = through.violation.worst <= tolerance and self.best.measure > SEARCH.dear * through.measure
-        return [through.q, self._start] if dear else []
-
     def _seek_lower(self, count: int) -> None:
-        """Where all is met, seek `count` lower minima, and one around things, from the best of feasible postures."""
-        tolerance, found = self.settings.tolerance, list[LocalSolution]()
-        if not self.settings.measures or self.best.violation.worst > tolerance:
+        """Where all is met, seek lower minima: `count` from feasible postures; one more, and others among things."""
+        tolerance, measures = self.settings.tolerance, self.settings.measures and self.problem.measures
+        if not measures or self.best.violation.worst > tolerance:
             return
-        starts, rng = self._around_things(), np.random.default_rng([self.settings.seed, count])
-        most = count + bool(starts)
-        if count:
-            given = self.problem, self.lineariser.state, self._start, rng, SEARCH.screened * count - 1
-            starts = [*(starts or [self._start]), *restarts(*given)]
-        for q in starts:
+        given, found = (self.problem, self.lineariser.state, self._start), list[LocalSolution]()
+        others = restarts(*given, np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count - 1)
+        for q in chain([self._start], others) if count else ():
             local = None if self.control.over else self._through_things(q, "for measure")
             if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
-        for local in sorted(found, key=lambda each: each.measure)[:most]:
+        for local in sorted(found, key=lambda each: each.measure)[:count]:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
+        if not self.settings.restarts:
+            return
+        least, tried = (self._through_measure, 0) if self._through_measure else self._below_things()
+        more = int(not (tried or count or self._touches))  # a descent to a contact takes ten times as long
+        rng = np.random.default_rng([self.settings.seed, count + 1])
+        starts = restarts(*given, rng, self.settings.restarts)
+        for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
+            dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
+            if number >= more + (0 if self._touches else int(SEARCH.dear * dear)) or self.control.over:
+                break
+            self._lower(q)
+
+    def _below_things(self) -> tuple[float, int]:
+        """Seek lower minima beside those through things; the least measures there, 0 if unknown, and starts tried."""
+        tolerance, least, tried = self.settings.tolerance, np.inf, 0
+        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
+        for q in (self._start, self.best.q):
+            if least < self.best.measure:
+                break  # otherwise another minimum through things than beside them
+            through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), q)
+            if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
+                least = through.measure
+                less = SEARCH.less_of_contacts if self._touches else SEARCH.less
+                if least < less * self.best.measure and not self.control.over:
+                    tried += 1
+                    self._lower(through.q)
+        return (least if np.isfinite(least) else 0.0), tried
+
+    def _lower(self, start: Array) -> None:
+        """Seek feasibility from a start, and descend from there as long as the measures may come below the least."""
+        local = self._through_things(start, "for measure")
+        if local is None or local.violation.worst > self.settings.tolerance:
+            return
+        descent = self._descent(self.settings.iterations, None, "for measure")
+        # far from the least measures, steps along curved constraints are short inside of a narrow funnel
+        descent.width, descent.below = SEARCH.width, SEARCH.less * self.best.measure
+        self._accept(self._ran(descent, local.q), "from a start for the measures")
 
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""

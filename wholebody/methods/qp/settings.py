@@ -175,8 +175,12 @@ class SearchNumbers(NamedTuple):
     lower: float = 0.9995  # share of a contact's measures below which those at its place are another minimum
     moved: float = 0.99  # share below which they are looked for again, at the place of that minimum. More: slower.
     poor: int = 2  # starts for the measures where it is none after all. More: lower, slower.
-    dear: float = 2.0  # times the measures through everything above which a lower minimum is sought. Less: slower.
     screened: int = 4  # feasible postures that are looked for, for each descended from. More: lower measures, slower.
+    # starts that seek lower minima, for each factor e that things multiply the measures by. More: lower, slower.
+    dear: float = 3.0
+    width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
+    less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
+    less_of_contacts: float = 0.5  # the same where terms are contacts, whose descents take ten times as long
 
 
 class StepNumbers(NamedTuple):

@@ -16,6 +16,7 @@ from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7
+IN_VAIN = 2.0  # times what a program saves that a descent still may. More: ends later where another minimum is lower.
 LAST = 8  # programs that lead back to the constraints where the measures still decrease: from 1e-2 m or rad beside them
 
 
@@ -31,6 +32,8 @@ class SQP(Stage):
     # whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are rejected
     # or gain little; else for a piece of it
     full_step: bool = False
+    width: float = DESCENT.width  # of the funnel at first
+    below: float = np.inf  # measures that are to be undercut: a descent that is not going to ends
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -48,7 +51,7 @@ class SQP(Stage):
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
         here = self._with_planes(self.look(start))
-        self._width = max(DESCENT.width, here.violation.total)
+        self._width = max(self.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.shared.solver)
         self._keep(here)  # a feasible start is an answer, should the descent end early
@@ -66,6 +69,8 @@ class SQP(Stage):
             program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
             step = self._predicted_step(here, program, answer)
+            if self._in_vain(here, step):
+                break
             swings = self._unimproved >= 4  # the measures, along curved constraints
             if swings or self._radius < LEAST_RADIUS or self._settled(here, step):
                 if feasible := self._feasible_before(here):
@@ -83,6 +88,11 @@ class SQP(Stage):
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return self.ended(here, converged, count)
+
+    def _in_vain(self, here: Iterate, step: Step) -> bool:
+        """Whether the measures are not going to be below what is known."""
+        free = self._gain == 1.0 and float(np.abs(step.answer).max(initial=0.0)) < self._radius
+        return free and step.parts is not None and here.at.measure - IN_VAIN * max(step.saves, 0.0) > self.below
 
     def _feasible_before(self, here: Iterate) -> Iterate | None:
         """The best feasible posture, if the descent later ended at an infeasible one and may return."""
@@ -143,7 +153,7 @@ class SQP(Stage):
     def _predicted_step(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
         """The step of a program with its predicted reduction; near the goals, with its two parts."""
         x, parts, flat, multipliers = answer.x, None, False, None
-        if self.measures and here.violation.total <= DESCENT.width:
+        if self.measures and here.violation.total <= self.width:
             parts = parts_of(program, answer, self._shift, self._working_set.room(program).work)
         if parts is None:
             saved = self.shared.subproblem.saving(program, here.rows, x)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -15,9 +15,11 @@ from wholebody.figures.state import State
 from wholebody.geometry.penetration import global_depth, least_separation
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.qp.closest import ENDLESS
+from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.iterates import LocalSolution, Run
+from wholebody.methods.qp.settings import SEARCH
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.starts import alike, restarts
+from wholebody.methods.starts import alike, halfway, restarts
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Goal, filled
@@ -29,6 +31,7 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.point import Point
 from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.surfaces import nearest
+from wholebody.tasks.touch import Touch, on_its_side
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
 
@@ -36,26 +39,42 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 def before_contact(
     problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
 ) -> Iterator[LocalSolution]:
-    """Descents that ignore contacts, to surfaces in front of their faces or, with `grips`, bars in front of palms."""
-    # The measures count: without contacts, they determine what the terms leave free.
-    terms = (*problem.goals, *problem.constraints)
-    state = shared.lineariser.state.update(problem.scene.figure.clamp(problem.start))
-    faces = any(_at_no_face(term, state) for term in terms)
-    if faces == grips or (grips and not any(takes_bar(term) for term in terms)):
+    """Descents to surfaces in front of what they are to touch or, with `grips`, to bars in front of palms too."""
+    terms, start = (*problem.goals, *problem.constraints), problem.scene.figure.clamp(problem.start)
+    state = shared.lineariser.state.update(start)
+    faces, bars = any(_at_no_face(term, state) for term in terms), any(takes_bar(term) for term in terms)
+    if grips and (faces or not bars):
         return
-    in_front = opened if grips else approached
-    goals = [in_front(term, IN_FRONT) for term in problem.goals]
-    constraints = [in_front(term, IN_FRONT) for term in problem.constraints]
-    alone = shared.lineariser.relaxed(ENDLESS)
-    alone.take(goals, alone.clearances, constraints)
-    start = problem.scene.figure.clamp(problem.start)
+
+    def in_front(given: Sequence[Any]) -> list[Any]:
+        beside = [on_its_side(term, problem.scene, state, IN_FRONT) for term in given]
+        return [opened(term, IN_FRONT) if grips else approached(term, IN_FRONT) for term in beside]
+
+    goals, constraints = in_front(problem.goals), in_front(problem.constraints)
+    sides = any(isinstance(a, Touch) and a is not b for a, b in zip((*goals, *constraints), terms, strict=True))
+    if not (grips or faces or (sides and not bars)):
+        return
+    # The measures count: without contacts, they determine what the terms leave free. Where a point is to come to its
+    # side of a thing, limbs first go around that.
+    runs, figure = list[Run](), problem.scene.figure
+    for depth in (SEARCH.rest_depth, 0.0) if sides else (ENDLESS,):
+        lineariser = shared.lineariser.relaxed(depth)
+        lineariser.take(goals, lineariser.clearances, constraints)
+        runs.append(with_values(shared, lineariser=lineariser))
+
+    def led(q: Array) -> LocalSolution:
+        for run in runs:  # to 1 mm or mrad: what is exact there is not where surfaces meet
+            given = run, 1e-3, 40, "before contact"
+            local = (Feasibility(*given, figure=figure) if sides else SQP(*given, full_step=True)).run(q)
+            q = local.q
+        return local
+
     # most descents, of which the first is from the start; of a driver in 30 one in ten is met; fingers close slowly
     count = 3 if grips else 24
     others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
-    for q in chain([start], others):
-        # to 1 mm or mrad: what is exact there is not where surfaces meet
-        local = SQP(with_values(shared, lineariser=alone), 1e-3, 40, "before contact", full_step=True).run(q)
+    for q in chain([start], [halfway(problem, state, start)] if sides else [], others):
+        local = led(q)
         # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
         if local.violation.worst <= 0.01:
             yield with_values(local, iterations=local.iterations + sum(each.iterations for each in missed))
