@@ -1,6 +1,6 @@
 """The assessment of any method's answer, computed from the posture alone.
 
-It shares nothing with the methods. Optimality and what stands in the way are computed when they are asked for.
+It shares nothing with the methods. Optimality and blockers are computed when they are asked for.
 `judged_postures` is the same in arrays, for many problems of one scene that are alike but for numbers.
 """
 

@@ -70,7 +70,7 @@ def shared(
         while left or alone or any(map(_works, others)):
             for child in others:
                 if child.job is None and (alone or left):
-                    # its share of what is left: it waits for the next while this process is busy with an item
+                    # its share of the remaining items: it waits for the next while this process is busy with an item
                     count = max(1, min(64, len(left) // jobs))
                     chunk = [alone.popleft()] if alone else [left.popleft() for _ in range(count)]
                     child.begin(there(chunk, False))

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     meaning = (
         "The error is the distance of what is dragged from where the goal is in that frame; at the end its "
         "angle, in mrad, where that is more. Depths are found by coal over every pair of pieces; between frames "
-        "stands a bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper "
+        "stands a bound, found by a continuous sweep, on how much deeper any pair gets in between than at its deeper "
         "end. Jerk is the third difference of the joint angles, rad/s³; CPU is the time that the processor worked on a "
         "frame; holds are in mm or mrad."
     )

@@ -74,4 +74,4 @@ def _notes(recording: Recording, judged: Judgement) -> None:
     if len(noted) > 5:
         print(f"... and {len(noted) - 5} frames more with a note; see the CSV file")
     for frame in judged.passed[:5]:
-        print(f"frame {frame}: something passes through something on the way to it")
+        print(f"frame {frame}: something passes through something on the motion to it")

@@ -9,9 +9,8 @@ from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled, with_loops
-from wholebody.base.dense_kernel import factorise, substitute
+from wholebody.base.dense_kernel import factorise, gram, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
-from wholebody.methods.qp.dense_kernel import gram
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
 ROUNDS = 8  # of 50 steps

@@ -1,4 +1,4 @@
-"""Whether pieces can have been in each other on the way of a step, where both ends of it are free.
+"""Whether pieces can have been in each other within a step, where both ends of it are free.
 
 Along a fixed direction the heights of all points of two pieces change linearly while the pieces move straight, and by
 no more than the sag of an arc while they turn. So if the direction parts them before and after a step, it parts them
@@ -54,7 +54,7 @@ class Way(NamedTuple):
 def free_between(
     state: BodiesState, before: StepStart, after: Contacts, margin: Array, travel: Array, time: float, gravity: float
 ) -> bool:
-    """Whether no pieces can have been deeper than `PASSING` in each other on the way of a step.
+    """Whether no pieces can have been deeper than `PASSING` in each other within a step.
 
     Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body moved more than its travel (n,).
     """
@@ -78,7 +78,7 @@ def free_between(
 
 
 def _can_meet(state: BodiesState, before: StepStart, pair: list[int], way: Way) -> bool:
-    """Whether two pieces can have met on the way of a step, which is followed in parts."""
+    """Whether two pieces can have met within a step, which is followed in parts."""
     pieces, placements = state.pieces, way.placement[0]
     first, second = pair
     a, b = (int(pieces.body[k]) for k in pair)
@@ -163,7 +163,7 @@ def apart(first: int, second: int, direction: Array, placement: Array, swept: Sw
 
 @compiled()
 def _sag(way: Way, a: int, b: int) -> float:
-    """Most by which the way of a point of one body, seen from the other, leaves the straight line, metres."""
+    """Largest deviation of a point's path on one body, in the frame of the other, from the straight line, metres."""
     turned = way.angle[a] ** 2 * way.lever[a] + way.angle[b] ** 2 * way.lever[b]
     return float(0.125 * turned + way.fall)
 

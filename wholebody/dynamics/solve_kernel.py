@@ -102,7 +102,7 @@ def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tupl
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
 def along_way(share: float, way: Array, impulse: Array, before: Array) -> tuple[float, float, float]:
-    """Go on by a share of the way (3,) that an impulse (3,) has gone; by how much along each axis."""
+    """Go on by a fraction of the displacement (3,) that an impulse (3,) has gone; by how much along each axis."""
     if share >= 1.0:
         way[0], way[1], way[2] = 0.0, 0.0, 0.0
         return 0.0, 0.0, 0.0

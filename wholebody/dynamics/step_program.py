@@ -225,7 +225,7 @@ class StepProgram:
         self.impulse[len(target) :] = start.joint
         self.residuals = solve_kernel.solve_from(
             old, new, self._rows, Laws(self._friction, target, hold), twist, self.impulse,
-            self._limits(1e-4),  # m/s: 0.4 um of the way of a step
+            self._limits(1e-4),  # m/s: 0.4 um of displacement in a step
         )  # fmt: skip
         twist[~moving] = given
 

@@ -228,7 +228,7 @@ class Exertion(_HeldPerson, SumOfSquares):
 class StrengthLimit(_HeldPerson, ComputedTogether):
     """Keep joint torques within strength, and the compression of the disc L5/S1 within a bound.
 
-    Rows are what is left: of the strength of each joint with published strength in either direction [share], and of the
+    Rows are reserves: of the strength of each joint with published strength in either direction [share], and of the
     compression [kN].
 
     Attributes:
@@ -249,7 +249,7 @@ class StrengthLimit(_HeldPerson, ComputedTogether):
     compression: Annotated[float, Range(100.0, 1e5, "N")] | None = MOST
 
     def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
-        """(m,) what is left, and its derivative (m, nv)."""
+        """(m,) reserves, and their derivative (m, nv)."""
         share, moves = self.statics.efforts(state)
         values, rows = [self.share - share, self.share + share], [-moves, moves]
         if self.compression is not None:

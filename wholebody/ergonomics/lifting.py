@@ -41,6 +41,9 @@ class Lift(Checked):
         coupling: "good", "fair" or "poor".
         load: kg; None for a lift of which only the limit is asked.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> lift = wb.ergonomics.Lift(horizontal=0.4, vertical=0.7, travel=0.5, load=10.0)
         >>> lift.index > 0.5

@@ -40,6 +40,9 @@ class FieldOfView(Checked):
         down: below it, radians.
         declination: of the normal line of sight below the head's own axis ahead, radians.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> narrow = wb.ergonomics.FieldOfView(horizontal=0.26)
     """

@@ -41,6 +41,9 @@ class Work(Checked):
         seated: None to tell it from the posture: both thighs lie, both knees are bent, no knee is on the ground, and
             the centre of mass is behind the feet.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> work = wb.ergonomics.Work(load=6.0, repeated=True)
     """

@@ -51,7 +51,7 @@ class State:
         column_joint: (n,) the joint that a column belongs to.
         parents: (njoints,) the joint that carries each joint.
         number: how many postures it was moved to.
-        kept: what is worth keeping by whoever computed it, who says by `number` of which posture it is.
+        kept: a cache of derived quantities; `number` says of which posture.
     """
 
     def __init__(self, model: pin.Model) -> None:

@@ -143,7 +143,7 @@ def _in_band(
     """Points of a piece that lie in the band below the plane of contact: how many there are.
 
     `size`: its radius and the width of the band. Of each point it writes by how much it lies below the plane (n,), and
-    its lever (3, n): the way from the witness point to it within the plane.
+    its lever (3, n): the vector from the witness point to it within the plane.
     """
     radius, band = size
     drop, lever = found

@@ -128,7 +128,7 @@ class PairTable:
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
         reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
-        self.reach = reach + beside_limbs(pieces, reach)
+        self.reach: Array = reach + beside_limbs(pieces, reach)
         self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         first, second = self.pairs.T

@@ -57,6 +57,9 @@ class Box(Shape):
     Attributes:
         size: full lengths along x, y and z, metres.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> table = wb.Box((1.2, 0.7, 0.04))
     """
@@ -74,6 +77,9 @@ class Sphere(Shape):
 
     Attributes:
         radius: metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> ball = wb.Sphere(radius=0.1)
@@ -93,6 +99,9 @@ class Capsule(Shape):
     Attributes:
         radius: metres.
         length: of the segment, without the two half balls, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> rail = wb.Capsule(radius=0.02, length=0.8)
@@ -116,6 +125,9 @@ class Cylinder(Shape):
     Attributes:
         radius: metres.
         length: along z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> post = wb.Cylinder(radius=0.05, length=2.0)
@@ -177,6 +189,9 @@ class Ellipsoid(Shape):
 
     Attributes:
         semi_axes: half lengths along x, y and z, metres.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> egg = wb.Ellipsoid((0.03, 0.03, 0.04))

@@ -47,6 +47,9 @@ class DampedLeastSquares(Checked, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> wb.solve(problem, wb.methods.DampedLeastSquares(damping=1e-2)).method
         'dls'

@@ -82,7 +82,7 @@ class Settings(NamedTuple):
     # whether the answer is the best posture of all, in place of the last one: for tools that may go in and do not lead
     # out again
     best: bool = False
-    least: int = 0  # fewest steps before the goals count as met, for tools that get out of the way of what comes
+    least: int = 0  # fewest steps before the goals count as met, for tools that evade what comes
 
 
 class Iteration:

@@ -84,7 +84,7 @@ def avoid(
         dynamics: keep the torques of joints within strength (the median of the person's sex and age if True; effort
             limits of a robot), and the zero moment point within the support. What the clip exceeds already is exceeded
             by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
-            zero moment point farther outside than it was. Contacts come first; the report says what is left. The method
+            zero moment point farther outside than it was. Contacts come first; the report names the rest. The method
             "trajectory" can do this.
         keep_ends: keep the first and the last posture as they are where they are free.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
@@ -94,7 +94,7 @@ def avoid(
 
     Returns:
         The new clip and a report. A clip that could not be freed is an answer too: `report.solved` is False, and
-        `report.message` says what is left.
+        `report.message` names remaining faults.
 
     Raises:
         InputError: the scene's figure has other joints than the clip's, or a constraint does not fit.

@@ -109,7 +109,7 @@ class Follower:
             step = self._tracker.step(q)
             self._work.programs += 1
             q = step.q
-            if np.abs(step.displacement).max(initial=0.0) <= 1e-3:  # rad, m: what is left is little
+            if np.abs(step.displacement).max(initial=0.0) <= 1e-3:  # rad, m: the remainder is small
                 break
         return q
 
@@ -177,7 +177,7 @@ class MethodResult(NamedTuple):
     """What a method makes of a clip."""
 
     q: Array  # (n, nq) postures
-    repair: bool = False  # whether the shared repair corrects what is left
+    repair: bool = False  # whether the shared repair corrects remaining faults
     frozen: tuple[str, ...] = ()  # joints and groups that the repair keeps as they are in the original postures
     message: str = ""  # what did not succeed, one sentence; empty where all did, or where the judge sees it by itself
     times: Array | None = None  # (n,) seconds of the clip as it was at which each frame is; None where the timing stays

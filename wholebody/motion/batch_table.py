@@ -26,7 +26,7 @@ class AvoidedCase:
         clip, equipment, method: what was asked.
         outcome: "free"; "left" where something is left; "refused" where the input is wrong; "ended" where its process
             ended, which a further run does again.
-        message: one sentence: what is left, or why there is no clip.
+        message: one sentence: the remaining faults, or why there is no clip.
         file: the clip, below the folder; empty where there is none.
         frames: of the clip.
         duration: of the clip before, seconds.
@@ -36,7 +36,7 @@ class AvoidedCase:
         deepest_before, deepest: of any pair in any frame, metres.
         deepest_between: of any pair at any time after, metres.
         angle: root of the mean square of the change of the joints, radians.
-        distance: root of the mean square of the way of the joints' centres, metres.
+        distance: root mean square displacement of the joints' centres, metres.
         jerk: of the joints, in parts of that before; None where the clip before has none.
         sliding: by how much standing feet slide more than before, metres.
         missed: largest miss of a constraint, metres or radians.

@@ -54,7 +54,7 @@ def deepest_shares(workspace: Workspace, q: Array, found: Mapping[int, Depths]) 
 
 
 def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Indices) -> list[float]:
-    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers."""
+    """Fractions of the path between two postures (nq,) at which pairs are nearest, by their numbers."""
     # A corner dips in a hundredth of a gap: between the nearest of many places golden sections look.
     model, data = workspace.model, workspace.model.createData()
     request, result = coal.DistanceRequest(), coal.DistanceResult()

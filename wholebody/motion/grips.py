@@ -26,11 +26,11 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
 
 NEAR = 0.02  # m: pairs nearer than this have rows
-SHARES = (0.25, 0.5, 0.75)  # of the way to the next frame: these places
+SHARES = (0.25, 0.5, 0.75)  # of the path to the next frame: these places
 
 
 class _Row(NamedTuple):
-    """A near pair at a place (1.25: a quarter of the way from frame 1 to 2), its distance (m), and the normal (3,)."""
+    """A near pair at a place (1.25: a quarter of the path from frame 1 to 2), its distance (m), and the normal (3,)."""
 
     place: float
     distance: float

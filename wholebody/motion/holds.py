@@ -169,7 +169,7 @@ class Holds:
     def _met(
         self, number: int, stand: ThingContact, frame: int, q: Array, places: Array, goals: Array
     ) -> tuple[Array, float, Array]:
-        """Of a contact in a frame its normal (3,), the distance of the parts, and the way (3,) from its goal."""
+        """Of a contact in a frame its normal (3,), the distance of the parts, and the vector (3,) from its goal."""
         assert self._touched is not None
         gap = self._touched.gap(stand, self.points[number], frame, q)
         normal = self._touched.at(stand, frame).rotation @ stand.normal

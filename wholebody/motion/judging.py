@@ -37,7 +37,7 @@ class AvoidanceReport:
 
     Attributes:
         solved: whether the clip is free, limits hold, and what is held and asked is met, by a check of its own.
-        message: one sentence that says what is left, or that all is free.
+        message: one sentence that names the remaining faults, or says that all is free.
         method: name of the method.
         seconds: wall time of the method, without the judgement.
         posture_solves, programs: how many postures were solved for on their own, and quadratic programs.
@@ -83,7 +83,7 @@ class AvoidanceReport:
     rough: bool = False
 
     def __str__(self) -> str:
-        """Three lines: what is left, before and after, and what it took."""
+        """Three lines: the faults, before and after, and what it took."""
         was, now = self.before, self.after
         return (
             f"{'free' if self.solved else 'not free'}: {self.message}\n"
@@ -122,7 +122,7 @@ def judged(
     was: ClipCheck, terms: FrameTerms, asked: MotionBounds, result: MethodResult, work: Work, method: str,
     loads: LoadChange | None = None,
 ) -> AvoidanceReport:  # fmt: skip
-    """The report on what a method made of a clip, of its check before, what holds in it, and what is asked of it."""
+    """The report on what a method made of a clip, of its check before, what holds in it, and the settings."""
     before, after = was.clip, was.clip.with_q(result.q)
     now = check(after, terms.scene, depth=COLLISION)
     times = before.times if result.times is None else result.times

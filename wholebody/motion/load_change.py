@@ -139,7 +139,7 @@ class LoadCurves(NamedTuple):
 
 
 def telling(loads: Sequence[Torques]) -> list[int]:
-    """The columns of `torque` of four joints that come nearest to their strength, or else need the largest torques."""
+    """The columns of `torque` of the four joints nearest to their strength, or else need the largest torques."""
     most = np.max([each.share.max(axis=0) for each in loads], axis=0)
     if not most.any():
         most = np.max([np.abs(each.torque).max(axis=0) for each in loads], axis=0)

@@ -59,7 +59,7 @@ class Midway(NamedTuple):
     """A place on the motion from a posture to that of a frame beside it."""
 
     other: Array  # (nq,) the posture beside it
-    share: float  # of the way to that
+    share: float  # of the path to that
     part: float  # of what is missing there, that the posture is to give way
     weight: float  # of what is missing: 1 is that of a bone
 

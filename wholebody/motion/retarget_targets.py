@@ -140,7 +140,7 @@ class Proportions:
     def __init__(
         self, motion: SkeletonMotion, figure: Figure, roles: Roles, ground: Ground, path: float | None = None
     ) -> None:
-        """Measure a recording; `path`: metres of the figure a metre of the way and heights, None as its legs."""
+        """Measure a recording; `path`: metres of the figure for a metre of the path and heights, None as its legs."""
         places, self._turned, lowest = standing_places(figure, roles)
         self._own, self._axes, self._fixed = _Body(places), rest_axes(motion, roles), figure.root == "fixed"
         self._joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
@@ -225,7 +225,7 @@ def _directed(own: _Body, source: _Body, first: str, second: str, start: Array) 
 
 
 def known_bones(limb: tuple[str, ...], side: str, roles: Collection[str]) -> list[tuple[str, str]]:
-    """Both ends of what lies between the roles of a limb that are known: bones, or what is left of them."""
+    """Both ends of what lies between the roles of a limb that are known: bones, or their remaining parts."""
     return list(pairwise(role for part in limb if (role := f"{side}_{part}") in roles))
 
 
@@ -320,7 +320,7 @@ def soles(
 ) -> dict[str, Array]:
     """Directions (3,) from ankles to toes in the ankles' axes, by role, as if feet were soled as the figure's are.
 
-    Skeletons have both joints at other heights above their soles; the way between them may differ by 20 degrees and
+    Skeletons have both joints at other heights above their soles; their direction may differ by 20 degrees and
     more. While both stand (n,) the sole is flat, which says in the ankle's axes where the toes of the figure would be:
     `places` (3,) are those in its neutral posture, by role.
     """

@@ -43,6 +43,9 @@ class Equipment:
         color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
         filling: the spheres that fill it, once `filled`.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> pack = wb.motion.Equipment("pack", wb.Box((0.15, 0.3, 0.4)), to="thorax", at=(-0.25, 0.0, 0.0))
     """

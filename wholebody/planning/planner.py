@@ -60,7 +60,7 @@ LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an 
 
 @dataclass(frozen=True, repr=False)
 class Plan:
-    """A planned motion and what it is worth.
+    """A planned motion and its figures.
 
     Attributes:
         clip: the motion, from the start to the goal; the start alone where none was found.
@@ -117,7 +117,7 @@ def plan(
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
         time_limit: seconds of the processor that all but compiling may take, the judgement too; at least 0.1. Free
-            roots are looked for within a metre of the way between the ends.
+            roots are sampled within a metre of the line between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
@@ -247,7 +247,7 @@ class _Search:
         if best is not None:
             before = np.inf
             while self._local is not self._slides and most < TIGHT * before and BUDGET.spent < POLISHED:
-                # most of what is left is for smoothing
+                # most of the remaining time is for smoothing
                 with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
                     if self._bodily:
                         best = shortcut(model, best, self._local, self._rng, True)
@@ -354,7 +354,7 @@ class _Judge:
         return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.6 * fastest) / self._pace.dt, 1e-9))
 
     def judged(self, path: Array) -> Plan:
-        """The motion along a path (m, nq) as fast as it may be, and what it is worth."""
+        """The motion along a path (m, nq) as fast as the limits allow, and its figures."""
         scene, pace = self.problem.scene, self._pace
         q, use = Timing(scene.figure, path, pace).within()
         asked, worst = self._between(q[-1]), _moved(self.problem, q)

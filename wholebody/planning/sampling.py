@@ -51,7 +51,7 @@ class Sampler:
         return self._drawn.pop()
 
     def near(self, q: Array, spread: float) -> Array:
-        """A posture (nq,) whose joints are a share of the way from q (nq,) to a random posture.
+        """A posture (nq,) whose joints are a fraction of the path from q (nq,) to a random posture.
 
         A free root is within `ROOM` of that of q. Where nothing is held it is a random share of that away, as narrow
         places are small, and in half of the postures it turns, about the vertical or about any axis.

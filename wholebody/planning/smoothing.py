@@ -17,7 +17,7 @@ from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
 APART = 0.35  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
-OVERSHOOT = 1.6  # of the way to between its neighbours that a posture moves; 1 = converges in twice as many sweeps
+OVERSHOOT = 1.6  # of the distance to its neighbours' mean that a posture moves; 1 = converges in twice as many sweeps
 SWEPT = 0.99  # of its length before a sweep: where it is longer after one, a path counts as tight
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
 
@@ -179,7 +179,7 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         anew = near > 0.01 * near.max()
         share -= 0.6 * share * np.where(anew, near / near.max(), 0.0)
-    # width of the filter of what is left of corners, points; larger = rounder, less exact
+    # width of the filter of the remaining corners, points; larger = rounder, less exact
     rounded, cut = local.settled(_postures(model, path, _filtered(places(model, found), 2.0)))
     if BUDGET.over:
         return path

@@ -237,7 +237,7 @@ class SceneContents(checks.FixedAttributes):
         """Move a thing to a new placement in the world, or in its segment's frame; as for `add`.
 
         With `over` it moves there from where it is, during the next frame of a tracker, a drag or a frame loop, in so
-        many seconds: its centre goes straight, and it turns about its centre. What it meets on the way counts. Without
+        many seconds: its centre goes straight, and it turns about its centre. Contacts on its path count. Without
         `over` it is put there, whatever is in between. If it is moved more than once before that frame, the frame sees
         one motion, from where the frame before saw it to where it is.
 

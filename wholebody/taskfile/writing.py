@@ -79,7 +79,7 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
 
 
 def _measure(term: Any, number: int) -> str:
-    """The table of a measure; a soft one is a goal that says so."""
+    """The table of a measure; a soft one is a goal with the key `soft`."""
     if not isinstance(term, tasks.Soft):
         return _table("[[measure]]", _term(term, MEASURES, "measures", number))
     return _table("[[goal]]", _term(term.goal, GOALS, "measures", number) | {"soft": term.weight})

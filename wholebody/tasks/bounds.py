@@ -30,6 +30,10 @@ class Freeze(Bound):
         joints: names of joints and groups; "root" for the figure's placement in the world, "anna/root" for
             that of one of several.
 
+    Raises:
+        InputError: no name.
+        UnknownNameError: in a problem, a joint or group that the figure does not have.
+
     Examples:
         >>> lower_body_stays = wb.Freeze("left_leg", "right_leg", "root")
     """
@@ -63,13 +67,17 @@ class StepLimit(Bound):
     """Bound the displacement of a step by velocity times dt. It does not bound a solve without a time step.
 
     A joint whose velocity is bounded brakes before its limits too: a step of dt goes at most the share
-    1 - exp(-dt / 0.05 s) of the way that is left to them.
+    1 - exp(-dt / 0.05 s) of their remaining distance.
 
     Attributes:
         velocity: limit of the joints [rad/s; m/s for prismatic joints].
         joints: other limits for joints and groups, by name; a later name overrides an earlier one.
         root_velocity: limit of the root's translation, along each of its own axes [m/s].
         root_turn: limit of the root's rotation, about each of its own axes [rad/s].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a joint or group that the figure does not have.
 
     Examples:
         >>> slow = wb.tasks.StepLimit(2.0, joints={"right_arm": 1.0}, root_velocity=0.5)
@@ -109,7 +117,7 @@ class StepLimit(Bound):
         return -reach, reach
 
     def braking(self, dt: float | None) -> Array:
-        """(nv,) largest share of the way to its limit that each freedom goes in a step of dt seconds."""
+        """(nv,) largest share of the distance to its limit that each freedom moves in a step of dt seconds."""
         # s in which the distance to a joint's limit decreases by 1/e at most: longer = softer stops, shorter = jolts
         share = 1.0 if dt is None else 1.0 - float(np.exp(-dt / 0.05))
         return np.where(np.isfinite(self._velocity), share, 1.0)

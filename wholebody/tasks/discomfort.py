@@ -50,6 +50,9 @@ class Discomfort(Measure):
     Attributes:
         weight: factor on the measure.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> relaxed = wb.tasks.Discomfort(weight=0.1)
     """
@@ -135,6 +138,9 @@ class PotentialEnergy(Measure):
 
     Attributes:
         weight: factor on the measure [1/J^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> lazy = wb.tasks.PotentialEnergy(weight=1e-3)

@@ -123,6 +123,9 @@ class Effort(DistanceMeasure):
     Attributes:
         weight: factor on the measure [1/rad^2].
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> least = wb.Effort(weight=1.0)
     """
@@ -144,6 +147,9 @@ class Displacement(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> upright = wb.tasks.Displacement(weight=0.1)
@@ -202,6 +208,9 @@ class RotationEffort(SumOfSquares):
     Attributes:
         weight: factor on the measure [1/rad^2].
         others: the start, and the weights of all other degrees of freedom; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> least = wb.tasks.RotationEffort()
@@ -278,7 +287,7 @@ def _hinges_of_one_centre(model: Any, first: int) -> list[int]:
 class Soft(SumOfSquares):
     """A goal as a preference: its squared error [m^2, rad^2], which is weighed against the other measures.
 
-    Goals and constraints come first: where a preference cannot be met, or costs more than it is worth, the answer is
+    Goals and constraints come first: where a preference cannot be met, or costs more than its weight, the answer is
     solved all the same. The error that is left is ``problem.measures[k].goal.error(state)``. Of a preference
     that stays far off "newton" converges slowly; take "qp". "ccd" and "placo" refuse it, and "dls" leaves it out.
 
@@ -286,6 +295,9 @@ class Soft(SumOfSquares):
         goal: any goal, such as `wb.Point("left_palm", place)`. Its weight is a factor too.
         weight: factor on the squared error. `Effort` of a person who reaches is about 1: with a weight of 100, 0.1 m
             cost as much.
+
+    Raises:
+        InputError: no goal, or a weight out of range.
 
     Examples:
         >>> rather = wb.Soft(wb.Point("left_palm", (0.3, 0.3, 1.0)), weight=10.0)

@@ -43,6 +43,10 @@ class Force(Checked):
         frame: where it acts: the origin of a frame.
         force: (3,) in the world [N].
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
     Examples:
         >>> push = wb.Force("right_palm", (-100.0, 0.0, 0.0))  # the hand pushes forward by 100 N
     """
@@ -122,6 +126,10 @@ class LoadedBalance(ComputedTogether):
         feet: segments that carry the figure, as for `Balance`.
         margin: least distance from the edges [m]; None for 0.15 of the polygon's least width.
         keeps: that margin; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:
         >>> steady = wb.ergonomics.LoadedBalance([wb.Force("right_palm", (-100, 0, 0))])

@@ -53,6 +53,10 @@ class Frame(PlacementGoal):
             pin.SE3; metres.
         weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range. A quaternion that is not of unit length.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
     Examples:
         >>> goal = wb.Frame("right_palm", (0.5, -0.2, 1.0, 0.0, 0.0, 0.0, 1.0))  # x, y, z and a quaternion x, y, z, w
     """
@@ -80,6 +84,10 @@ class Orientation(PlacementGoal):
         frame: name of the frame, segment or joint.
         target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
         weight: factor on the squared error [1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range. A quaternion that is not of unit length.
+        UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:
         >>> level = wb.Orientation("right_palm", (0.0, 0.0, 0.0, 1.0))  # a quaternion x, y, z, w
@@ -113,6 +121,10 @@ class Relative(PlacementGoal):
             metres. None for the relative placement at the start.
         orientation: False leaves the frame free to turn about its origin.
         weight: factor on the squared error [1/m^2 and 1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:
         >>> together = wb.Relative("left_palm", "right_palm", (0.0, 0.0, 0.3), orientation=False)
@@ -148,6 +160,10 @@ class Hold(PlacementTerm, Constraint):
             (4, 4) or a pin.SE3; metres. None for its placement at the start.
         orientation: False holds only the frame's origin and leaves the frame free to turn.
         relative_to: name of the frame that `at` is relative to; None for the world.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:
         >>> feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]

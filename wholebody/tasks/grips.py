@@ -80,7 +80,7 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
 class Crossing(NamedTuple):
     """A bar that crosses the palm: one row across the palm, and one along the bar that is zero within its room [m].
 
-    The first row is what x . w has beyond its room, with x the axis of the fingers and w the way from the palm's middle
+    The first row is what x . w has beyond its room, with x the fingers' axis and w the vector from the palm's middle
     to the bar's axis.
     """
 

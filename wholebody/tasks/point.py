@@ -28,6 +28,10 @@ class Point(Goal):
         offset: (3,) the point in the frame's own axes [m].
         weight: factor on the squared error [1/m^2].
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
     Examples:
         >>> touch = wb.Point("right_index_tip", (0.55, -0.25, 0.95))
     """
@@ -66,6 +70,10 @@ class CenterOfMass(Goal):
         weight: factor on the squared error [1/m^2].
         figure: name of the figure whose centre of mass it is; None for all figures of the scene together.
         joints: its joints; None for all of the scene.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a figure that the scene does not have.
 
     Examples:
         >>> lean = wb.CenterOfMass((0.05, 0.0, 0.0), axes="xy")
@@ -114,6 +122,10 @@ class Plane(Constraint):
         point: (3,) a point in the plane [m]; None for the frame's position at the start.
         side: "on" keeps it in the plane, "above" lets it move to the side to which the normal points.
         height: n . p of the plane, its distance from the world's origin along the normal [m]; once resolved.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
 
     Examples:
         >>> above_the_table = wb.Plane("right_wrist", (0, 0, 1), point=(0.0, 0.0, 0.8), side="above")

@@ -31,6 +31,10 @@ class Posture(Goal):
         joints: names of the joints and groups that the goal moves; None for all, including the root.
         weight: factor on the squared error [1/rad^2 and 1/m^2].
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a posture, joint or group that the figure does not have.
+
     Examples:
         >>> arms = wb.Posture("t_pose", joints=["left_arm", "right_arm"])
     """

@@ -177,6 +177,10 @@ class ReachCones(RangeConstraint):
     Attributes:
         names: names of the figure's cones; None for all of them.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a cone that the figure does not have.
+
     Examples:
         >>> shoulder = wb.tasks.ReachCones(["left_shoulder"])
     """
@@ -209,6 +213,10 @@ class RangeOfMotion(RangeConstraint):
 
     Attributes:
         names: names of the figure's ranges; None for all of them.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a range that the figure does not have.
 
     Examples:
         >>> neck = wb.tasks.RangeOfMotion(["neck"])

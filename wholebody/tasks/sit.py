@@ -44,6 +44,10 @@ class Sit(ContactTerm):
         erect: whether hips, spine and neck are held as people are measured.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
     Examples:
         >>> seated = wb.Sit(on="seat", back="backrest")
     """

@@ -47,6 +47,10 @@ class Stand(TermOfParts):
         parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
             the distances of the centre of mass inside the edges [m]; once resolved.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
     Examples:
         >>> upright = wb.Stand("floor")
     """
@@ -146,6 +150,10 @@ class Stance(SumOfSquares):
         places: of the two, once resolved.
         rest: (3,) f, w and t in the posture.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a segment that the figure does not have.
+
     Examples:
         >>> side_by_side = wb.tasks.Stance()
     """
@@ -211,6 +219,10 @@ class Hang(SumOfSquares):
         weight: factor on the measure.
         places: of these, once resolved.
         down: (k, 3) directions in their joints that hang.
+
+    Raises:
+        InputError: no name, or a weight out of range.
+        UnknownNameError: in a problem, an arm that the figure does not have.
 
     Examples:
         >>> at_ease = wb.tasks.Hang(["left_upper_arm"])

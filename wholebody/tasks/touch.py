@@ -32,7 +32,7 @@ class Touch(ContactTerm):
     The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
     that of the nearest points along the normal. A frame on the round end of its own piece counts as touching where the
     piece does, if it is at most 8e-6 m off there; one within a flat face lays that on what it touches. Two frames meet:
-    the value is the way between their origins (3,) and, where both are on their own pieces, which then face each other,
+    the value is the vector between their origins (3,) and, with both on their own pieces, which then face each other,
     an angle (2,) [rad]. Use it as a goal or as a constraint. The clearance of what is to touch is zero, for a frame
     that of the segment which carries it. A thing that is moved is touched where it is.
 
@@ -41,6 +41,10 @@ class Touch(ContactTerm):
             without pieces what is drawn of it touches, else, if it has mass or a joint, what moves with it.
         thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
         weight: factor on the squared distance, as a goal [1/m^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
         >>> palm_on_table = wb.Touch("right_palm", "table")
@@ -87,6 +91,10 @@ class Lean(ContactTerm):
         part: the segment that leans on it.
         side: (3,) direction in the part's axes that looks at the thing; backwards if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
         >>> back = wb.tasks.Lean("wall", part="thorax")

@@ -295,7 +295,7 @@ def _box(limits: Array, places: Integers, boxes: Array, q: Array, box: Array) ->
         box[0, v], box[1, v] = -np.inf, np.inf
     for e in range(len(limits)):
         low, high = limits[e, 0] - q[places[e, 0]], limits[e, 1] - q[places[e, 0]]
-        # a joint that is to brake goes a share of the way that is left, and comes back the whole way
+        # a joint that brakes moves a share of the remaining distance, and returns the whole distance
         box[0, places[e, 1]] = low * limits[e, 2] if low < 0.0 else low
         box[1, places[e, 1]] = high * limits[e, 2] if high > 0.0 else high
     for e in range(0, len(boxes), 2):

@@ -150,7 +150,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     parts[kinds.BOX], other_bounds = _boxes(bounds, state, dt)
     other_measures, curvature = _measures(measures, model, parts)
     parts[kinds.CURVATURE] = [((0,), curvature)]
-    # largest share of the way to its limit that each freedom goes in a step
+    # largest share of the distance to its limit that each freedom moves in a step
     braking = np.min([np.ones(model.nv), *(one.braking(dt) for one in bounds if type(one) is tasks.StepLimit)], axis=0)
     parts[kinds.LIMIT] = [
         ((int(q), int(v)), np.array([low, high, braking[v]]))

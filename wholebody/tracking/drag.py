@@ -59,7 +59,7 @@ class GoalMoves:
         return float(self._seconds * 2.0 ** min(self._starved // 3, 4))
 
     def shares(self, error: float) -> Iterator[float]:
-        """Shares of the way to a goal that is `error` m or rad away, tried until a motion is free or time is up."""
+        """Fractions of the path to a goal that is `error` m or rad away, tried until a motion is free or time is up."""
         self._error = error
         moves = (self._most, *(move for move in (0.01, 0.002) if move < self._most))  # m, rad
         for turn, move in enumerate(moves):
@@ -252,7 +252,7 @@ class Drag(NotCopyable, Generic[Answer]):
     solve every frame anew from the present posture, "ccd" and "placo" to a millimetre. No method restarts from other
     postures. If the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that
     frame. If a thing was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with
-    `over`) "qp" gets out of the way as they come; the others meet them where they end. What they could not avoid is
+    `over`) "qp" evades them as they come; the others meet them where they end. What they could not avoid is
     named in the answer. A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
 
     With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough

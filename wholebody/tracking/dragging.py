@@ -38,7 +38,7 @@ class Dragged:
         seconds, cpu_seconds: (n,) of each frame: wall time, and the processor's for this thread.
         iterations: (n,) of the method in each frame.
         end: the solution at the end.
-        paths: the way to each posture, as in `DragFrame`; empty where it is straight.
+        paths: the path to each posture, as in `DragFrame`; empty where it is straight.
 
     Examples:
         >>> wholebody.tracking.drag_along(problem, [(0.5, -0.25, 0.95)], "qp").method

@@ -22,7 +22,7 @@ class Resolution(NamedTuple):
     pairs: int
     note: str
     swept: bool = False  # whether the motion to the first of them was swept and is free, where nothing moves by itself
-    # where things moved, shares of the frame and postures (nq,) on the way to the first of them
+    # where things moved, shares of the frame and postures (nq,) before the first of them
     path: tuple[tuple[float, Array], ...] = ()
 
 

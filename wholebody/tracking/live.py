@@ -36,7 +36,7 @@ class LiveFrame(NamedTuple):
     overlap: float  # deepest overlap, metres
     seconds: float  # that the frame took
     status: str  # one line: what is dragged, by which method, and what is wrong if something is
-    path: tuple[tuple[float, Array], ...] = ()  # as in `DragFrame`: the way within the frame, where a thing was moved
+    path: tuple[tuple[float, Array], ...] = ()  # as in `DragFrame`: the path within the frame, where a thing was moved
 
 
 class LiveDrag:

@@ -40,7 +40,7 @@ class FrameLoop(NotCopyable):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
     Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with
-    "qp" the figure gets out of its way as it comes. One that was put into the figure is left as fast as joints may
+    "qp" the figure evades it as it comes. One that was put into the figure is left as fast as joints may
     move. What could not be avoided, and what the figure is still inside of, is named in the frame.
 
     Attributes:

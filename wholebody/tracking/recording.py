@@ -31,7 +31,7 @@ class Recording:
         seconds, cpu_seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
         iterations, joints, pairs: (n,) as in `Frame`.
         notes: a note for each frame, mostly empty.
-        paths: the way to each posture, as in `Frame`; empty where it is straight.
+        paths: the path to each posture, as in `Frame`; empty where it is straight.
         moves: things that moved, with their placements at the ends of the frames.
 
     Examples:

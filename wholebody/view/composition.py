@@ -151,8 +151,8 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
         ("/first", LOOK.contact_node, LOOK.global_depth, "global penetration depth PD_g"),
         ("/second", LOOK.contact_node, LOOK.global_depth, "global penetration depth PD_g"),
         ("/cancelled", LOOK.contact_node, LOOK.global_depth, "global penetration depth PD_g"),
-        ("/target", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
-        ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+        ("/target", LOOK.goal_node, LOOK.target, "goal, and the line to it"),
+        ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the line to it"),
         ("/ball", LOOK.blocker_node, LOOK.blocker, "in the way"),
     )
     for end, folder, shade, meaning in marked:

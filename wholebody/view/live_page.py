@@ -315,7 +315,7 @@ class LivePage:
         self._show(frame)
 
     def follow(self, target: Any) -> LiveFrame:
-        """Make one frame towards a place (3,) of the mouse, and show it, with the way within it."""
+        """Make one frame towards a place (3,) of the mouse, and show it, with the path within it."""
         name, before, drag = self.drag.taken, self.drag.q, self.drag
         place, things = drag.place(name), drag.scene.objects
         began = things[name].placement if name in things else None

@@ -64,7 +64,7 @@ class Goals:
             keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(target.translation))
 
     def targets(self, state: State) -> Array:
-        """Positions (n, 3) that should be in the picture; on the way to what is looked at from afar."""
+        """Positions (n, 3) that should be in the picture; with those between it and a distant gaze target."""
         found = [np.zeros((0, 3))]
         for goal in self.goals:
             target, _ = _target(goal, self._here(goal, state), state, self.scene)

@@ -212,7 +212,7 @@ def sweep(rng: np.random.Generator, folder: Path) -> Verdict:
 
 
 def swept(scene: Scene, start: Array, end: Array, found: FirstContact | None, seconds: float) -> Verdict:
-    """Judge what a sweep found on the way from one posture (nq,) to another, and took in seconds of CPU time."""
+    """Judge what a sweep found between one posture (nq,) to another, and took in seconds of CPU time."""
     pairs, parts = Pairs(scene), 150
     rounding = 3e-6 * max(1.0, pairs.size)
     shares = np.linspace(0.0, 1.0, parts + 1)
@@ -221,7 +221,7 @@ def swept(scene: Scene, start: Array, end: Array, found: FirstContact | None, se
     near = np.linspace(shares[max(top - 1, 0)], shares[min(top + 1, parts)], 40)
     shares, deeper = np.append(shares, near), np.append(deeper, _deeper(pairs, scene, start, end, near))
     deepest = float(deeper.max(initial=0.0))
-    words = f"the deepest on the way is {deepest:.3g} m deeper than at the start"
+    words = f"the deepest in between is {deepest:.3g} m deeper than at the start"
     if found is None:
         if deepest > TOLERANCE + rounding:
             return Verdict("wrong", f"nothing was found; {words}", seconds)
@@ -250,7 +250,7 @@ def _deeper(pairs: Pairs, scene: Scene, start: Array, end: Array, shares: Array)
 
 
 class Watch:
-    """Looks at every step of a stream, and at the way between two postures."""
+    """Looks at every step of a stream, and at the motion between two postures."""
 
     def __init__(self, problem: Problem, constraints: Sequence[Any], *, speed: float, dt: float) -> None:
         """Begin; joints may move at `speed` [rad/s or m/s], inf for any, and a step takes `dt` seconds."""

@@ -215,7 +215,7 @@ WEIGHTS = {
     "elbow": ((0.0, 10.0), (10.0, 5.0)), "wrist": ((0.0, 10.0), (10.0, 5.0)),
 }  # fmt: skip
 DAMPING, MOST, GAIN = 0.5, 10, 1e-3  # of a step; largest number of further steps; least decrease of the error in each
-FIRST = 20  # iterations for the first frame before the motion begins, so that the way there is not judged
+FIRST = 20  # iterations for the first frame before the motion begins, so that the approach is not judged
 
 
 class MinkRetargeting:

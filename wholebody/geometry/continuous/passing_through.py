@@ -71,7 +71,7 @@ def entered(
 ) -> list[Entered]:  # fmt: skip
     """The pairs that penetrate on a path or at its end; none if the path or the direct motion is free.
 
-    They get deeper on the way by `OVERLAP`, or overlap at the end by `INSIDE`, for pairs not watched (pairs,) more than
+    They get deeper within it by `OVERLAP`, or overlap at the end by `INSIDE`, for pairs not watched (pairs,) more than
     at the beginning. The path has one configuration (nq,) or more.
     """
     last = _by_pair(depths.start(path[-1]), len(watched))

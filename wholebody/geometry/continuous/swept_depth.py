@@ -64,7 +64,7 @@ class SweptDepth:
         return self._overlaps(np.flatnonzero(self._now.least < 0.0))
 
     def advance(self, q: Array) -> tuple[Depths, Depths]:
-        """Go on to the next posture (nq,): the pairs that overlap there, and on the way or at one of its ends."""
+        """Go on to the next posture (nq,): the pairs that overlap there, and along the motion or at one of its ends."""
         # None gets deeper than tolerance and depth; depths beyond it may be large by `SHARP` of it and `COARSE`.
         assert self._q is not None
         self._before, self._now = self._now, self._before
@@ -85,13 +85,13 @@ class SweptDepth:
         return found, passing
 
     def _look(self, before: Array, speed: Array) -> tuple[Depths, Indices]:
-        """Overlaps at the present posture, and the pairs that may overlap on the way there."""
+        """Overlaps at the present posture, and the pairs that may overlap on the motion there."""
         doubtful = self._screened(before, speed)
         overlaps = self._overlaps(doubtful)
         return overlaps, doubtful[before[doubtful] + self._now.least[doubtful] - speed[doubtful] < 0.0]
 
     def _screened(self, before: Array, speed: Array) -> Indices:
-        """The pairs that may overlap on the way to the present posture or at it; bounds there of all."""
+        """The pairs that may overlap on the motion to the present posture or at it; bounds there of all."""
         now, table = self._now, self._table
         count = self._kernel.screen(
             now.places, (table.pairs, table.reach, table.half), speed, before, now.least, self._extent, self._index
@@ -112,7 +112,7 @@ class SweptDepth:
         place.ask(numbers)
 
     def _between(self, doubtful: Indices, speed: Array, velocity: Array) -> Depths:
-        """Depths on the way from the posture before to the present one, all parts halved together."""
+        """Depths on the motion from the posture before to the present one, all parts halved together."""
         # Each row is a pair during a part: `which` of the pairs, and the places before and after it in `stack`.
         assert self._q is not None
         stack = _Stack(self._before.places, self._now.places)

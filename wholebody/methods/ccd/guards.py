@@ -49,7 +49,7 @@ class Polygon:
     def nearest(self, direction: Vector) -> Vector:
         """The nearest direction inside to a unit direction outside, a little inside of the edge."""
         angle, inward = self._cone.signed_angle(direction)
-        # a share of the way to the middle; larger than rounding
+        # a share of the distance to the middle; larger than rounding
         found = np.cos(angle) * np.array(direction) - np.sin(angle) * inward + 1e-6 * self._cone.visible
         return three(found / np.linalg.norm(found))
 

@@ -69,6 +69,9 @@ class CCD(Checked, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> hand = wb.load("hand")
         >>> tip = wb.Problem(wb.Scene(hand), goals=[wb.Point("right_index_tip", (0.15, 0.03, -0.02))])
@@ -186,7 +189,7 @@ class _Search:
         return best if not self._control.over else replace(best, converged=False)
 
     def _closed(self, best: _Trial) -> _Trial:
-        """A trial that misses the goals, or a posture on the way to it, where loops are closed and nothing overlaps."""
+        """A trial that misses the goals, or an intermediate posture, where loops are closed and nothing overlaps."""
         if not self._request.loops or self._solves(best):
             return best
         self._reach.begin(replace(self._request, goals=self._request.loops), Control(np.inf))

@@ -154,7 +154,7 @@ class Assembly(AssemblyJoints):
         return max(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
 
     def interpolate_goal(self, goal: int, share: float, target: Any) -> Self:
-        """Move a goal to a share (0 to 1) of the way from where its body is now to a target."""
+        """Move a goal to a fraction (0 to 1) of the path from where its body is now to a target."""
         one = self._goals[self.goal_index(goal)].moved(target)
         self._goals[goal] = one.between(self._placed(one.index), number(share, "share", 0.0, 1.0))
         return self
@@ -204,7 +204,7 @@ class Assembly(AssemblyJoints):
 
         Where they hold, the measures that `minimise` names are lowered.
 
-        No step jumps over a shape, and none of the states on the way is deeper in a shape than a centimetre; a shape
+        No step jumps over a shape, and none of the intermediate states is deeper in a shape than a centimetre; a shape
         that a body is inside of at the start is left. The solution's `penetration` is judged by all pairs.
 
         Args:

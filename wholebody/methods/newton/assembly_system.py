@@ -49,7 +49,7 @@ class AssemblySolution:
         penetration: depth of the deepest overlap of the tested pairs at the end, metres; judged by coal for all pairs
             at once. 0 without shapes.
         least_distance: of the tested pairs, metres; inf without shapes.
-        path: (k, nq) the states on the way as postures of the assembly's `scene`, the first as before the solve and the
+        path: (k, nq) intermediate states as postures of the assembly's `scene`, the first as before the solve and the
             last as after it.
         message: one sentence that explains the status and names bodies.
 
@@ -134,7 +134,7 @@ class AssemblyGoal:
         return np.concatenate([way, turn])
 
     def between(self, body: Any, share: float) -> AssemblyGoal:
-        """The goal at a share of the way from where it is now to the target."""
+        """The goal at a fraction of the path from where it is now to the target."""
         error, here = self.error(body), body * self.local
         turned = pin.exp3(share * error[3:]) @ here.rotation
         return replace(self, target=pin.SE3(turned, here.translation + share * error[:3]))

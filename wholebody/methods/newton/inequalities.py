@@ -121,7 +121,7 @@ class LogBarrier:
 
 
 def _to_boundary(values: Array, step: Array) -> float:
-    """Share of a step (k,) that keeps positive values (k,) positive: at most 0.95 of the way to the boundary."""
+    """Share of a step (k,) that keeps positive values (k,) positive: at most 0.95 of the distance to the boundary."""
     falling = step < 0.0
     return float(min(1.0, (-0.95 * values[falling] / step[falling]).min(initial=1.0)))
 

@@ -49,6 +49,9 @@ class Newton(Settings, Descends):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None,
             the numbers of iterations end it, and at last twenty seconds of processor time.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> wb.solve(problem, wb.methods.Newton(iterations=100)).status
         'solved'

@@ -169,7 +169,7 @@ class FigureSystem(ActiveSystem):
         """Renew limits, measures and contacts at x; returns whether the pattern changed."""
         x = self.retract(x)
         if self._own and (error := undefined(self._own, self.workspace.state.update(self.q))) is not None:
-            raise error  # measures are read where a step ends, and not on the way there
+            raise error  # measures are read where a step ends, not within it
         return super().arrive(x)
 
     def _projected(self, x: Array) -> Array:

@@ -252,7 +252,7 @@ def _line_minimum(
 ) -> float:
     """The step in [0, longest] along a way (n,) from x (n,) with the least objective.
 
-    The derivative along the way is a(t) = base + rise t - sum over pushing rows of v_j s_j (l_j - c_j x - t s_j), with
+    The derivative along the step is a(t) = base + rise t - sum over pushing rows of v_j s_j (l_j - c_j x - t s_j), with
     s_j = c_j way; rows begin or cease to push where l_j - c_j x = t s_j. `speed` (k,) is room for s.
     """
     diagonal, linear, rows = program.diagonal, program.linear, program.rows

@@ -208,7 +208,7 @@ class Descents:
         return not any(is_free(self.workspace, chain.posture(values, at), deep, within) for values in found)
 
     def _nearest(self) -> Met:
-        """Where descents from the first seeds come nearest to the goals with everything held: a few, which differ."""
+        """The closest postures of descents from the first seeds with everything held: a few, which differ."""
         seeds = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together))
         # All of them, although some may meet the goals inside of things.
         found, _ = self._descended(seeds, how_far(self.settings, len(seeds), others=True))

@@ -84,7 +84,7 @@ def reach(
             if enough <= 0.0:
                 return k + 1
             continue
-        # Programs for the least effort remove what is left of errors too, where they have a way to go.
+        # Programs for the least effort remove the remaining errors too, where they have a way to go.
         done = 1e-3 * tolerance if weighed and len(q) > len(room.value) else 0.0
         steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most)
         left = np.sqrt(dot(room.value, room.value))

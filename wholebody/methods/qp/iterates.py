@@ -60,7 +60,7 @@ class Iterate(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What a program says about the way from a posture."""
+    """What a program says about the step from a posture."""
 
     dq: Array  # (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain
     parts: Parts | None  # the answer's parts; None far from the goals, and where measures do not count

@@ -24,12 +24,12 @@ LAST = 8  # programs that lead back to the constraints where the measures still 
 class SQP(Stage):
     """One descent; call `run` once."""
 
-    # (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one
+    # (goal rows,) subtracted from the goal errors: an intermediate goal before the true one
     offset: Array | None = None
     # whether the measures count from the beginning; without them only the goals are sought, and the first feasible
     # posture is the end
     measures: bool = True
-    # whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are rejected
+    # whether to ask for the whole goal error in every step, damped by how far they are, until steps are rejected
     # or gain little; else for a piece of it
     full_step: bool = False
     width: float = DESCENT.width  # of the funnel at first

@@ -65,7 +65,7 @@ class Extrapolation:
         return np.clip(parts.normal + fast, program.lower, program.upper)
 
     def record(self, parts: Parts, way: Array, extrapolated: bool) -> None:
-        """Remember the way (n,) that was gone after the last proposal, and whether it was the proposed one."""
+        """Remember the displacement (n,) after the last proposal, and whether it was the proposed one."""
         self._memory.record(way - parts.normal)
         if extrapolated or self._as_plain:
             self._longest = min(LONGER * self._longest, STRETCH)

@@ -100,7 +100,7 @@ class QPTracker(SolvingTracker):
         """
         enough = TRACKING.of_a_frame if tolerance is None else TOLERANCE(tolerance, "tolerance")
         exact = enough < TRACKING.of_a_frame
-        # a bound on speeds is one of the way of a whole frame
+        # a bound on speeds holds for a whole frame
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else TRACKING.programs[exact]
         last, error, way = self.step(q), np.inf, np.inf
         if last.path:
@@ -170,7 +170,7 @@ class QPTracker(SolvingTracker):
         )  # fmt: skip
 
     def _unbraked(self, at: PackedLinearisation) -> PackedLinearisation:
-        """The same, with joints that need not brake: to get out of the way they go up to their limits."""
+        """The same, with joints that need not brake: to evade a body they move up to their limits."""
         at.box[:] = allowed(self.problem.bounds, self.problem.scene.figure.limits, self.workspace.state, self.dt)
         return at
 

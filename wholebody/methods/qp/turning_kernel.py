@@ -50,7 +50,7 @@ def linearisation_error(
 ) -> float:  # fmt: skip
     """Largest share of what is unseen by which a pair that may end too near can be nearer than its rows say.
 
-    Unseen is what a pair may end nearer than its rows say: what is asked of it, within bounds. 0 where no pair can be
+    Unseen is by how much a pair may end nearer than its rows say: its clearance, within bounds. 0 where no pair can be
     nearer by so much.
 
     The distance of a pair is at least that of its points to a plane that moves with one of its pieces. To second order

@@ -65,6 +65,9 @@ class Bisection(Checked):
             follows the original more closely and predicts more postures.
         short: programs after which a prediction of "qp" is ended where others may be tried.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> wb.avoid(clip, scene, method=wb.motion.Bisection(buffer=30.0)).report.solved
         True

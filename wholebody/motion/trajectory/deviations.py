@@ -62,7 +62,7 @@ class Chart:
         return result
 
     def between(self, before: Array, after: Array, share: float) -> tuple[Array, Array, Array]:
-        """The posture at a share of the way between two (nq,), and its derivatives (nv, nv) with respect to both."""
+        """The posture at a fraction of the path between two (nq,), and its derivatives (nv, nv) by both."""
         model = self.model
         way = np.asarray(pin.difference(model, before, after))
         q = np.asarray(pin.integrate(model, before, share * way))

@@ -105,7 +105,7 @@ def _iterated(program: BandedQP, accuracy: float, gap: float) -> Answer:
         ahead = float((s + along * ds) @ (y + across * dy)) / count
         centred = ahead * (ahead / mu) ** 2 if mu > 0.0 else 0.0
         dz, change, ds, dy = newton.direction(s * y + ds * dy - centred)
-        along, across = 0.995 * _share(s, ds), 0.995 * _share(y, dy)  # of the way to the next bound
+        along, across = 0.995 * _share(s, ds), 0.995 * _share(y, dy)  # of the distance to the next bound
         if max(along, across) < 1e-8:  # a step that is a smaller share of Newton's leads nowhere
             break
         z, Az = z + along * dz, Az + along * change

@@ -1,6 +1,6 @@
 """Where a trajectory is looked at, and the rows that hold there: at every frame, and between frames where it dips.
 
-A node is a frame, or a share of the way from a frame to the next. Its rows come from exact shapes: distances of all
+A node is a frame, or a fraction of the path from a frame to the next. Its rows come from exact shapes: distances of all
 near pairs, and `wholebody.geometry.contact_rows`. Inequality constraints give rows like those of contacts. Equality
 constraints are kept apart, because they are met by a penalty with multipliers.
 """
@@ -29,10 +29,10 @@ Terms = Sequence[Constraint | Goal]
 
 
 class Node(NamedTuple):
-    """A frame of the window, a share (0 to 1) of the way from it to the next, or the loads of a frame."""
+    """A frame of the window, a fraction (0 to 1) of the path from it to the next, or the loads of a frame."""
 
     frame: int  # the first frame whose deviation counts
-    share: float = 0.0  # of the way to the next one
+    share: float = 0.0  # of the path to the next one
     # the frame whose loads are looked at, which depend on the frames before and after it; -1 for contacts
     loaded: int = -1
 

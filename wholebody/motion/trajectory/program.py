@@ -134,7 +134,7 @@ def lay_out(objective: Objective, limits: Limits, step: Step) -> Layout:
 
 
 def box(x: Array, limits: Limits, radius: float, dofs: Indices) -> tuple[Array, Array]:
-    """(n, a) bounds of the deviations: the limits, and the trust region; where they are apart, the way there."""
+    """(n, a) bounds of the deviations: the limits and the trust region; where these are apart, bounds towards it."""
     now = x[:, dofs]
     low, high = limits.lower[:, dofs], limits.upper[:, dofs]
     least, most = np.maximum(low, now - radius), np.minimum(high, now + radius)

@@ -140,6 +140,9 @@ class BallJoint(Checked):
         at: (3,) the point in the thing's axes, metres; where it is at the start is where it stays.
         to: name of the thing that holds it; None for the world. The two do not collide with each other.
 
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+
     Examples:
         >>> lamp = wb.Body(mass=1.0, joints=[wb.dynamics.BallJoint(at=(0.0, 0.0, 0.5))])
     """
@@ -154,6 +157,9 @@ class Hinge(BallJoint):
 
     Attributes:
         axis: (3,) direction of the axis in the thing's axes.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
 
     Examples:
         >>> door = wb.Body(mass=20.0, joints=[wb.dynamics.Hinge(at=(0.0, -0.45, 0.0), axis=(0.0, 0.0, 1.0))])

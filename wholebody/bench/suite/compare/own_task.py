@@ -78,7 +78,7 @@ def _ready(problem: Problem) -> Ready:
 
 
 def _row(name: str, first: Mapping[str, Figure], records: Sequence[Record]) -> Row:
-    """One method: what came of it, its times, and what is left, as judged; no figures where there is no answer."""
+    """One method: its outcome, its times, and the remaining errors, as judged; no figures where there is no answer."""
     last, warm = records[-1], [1e3 * record.seconds for record in records[1:]]
     if last.outcome != ANSWERED:
         return Row("task", name, {"outcome": last.outcome, "said": last.said})

@@ -174,7 +174,7 @@ def _of_set(measured: Mapping[str, Any]) -> dict[str, Any]:
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, float):
-        return float(f"{value:.9g}")  # what is left of the last digits is rounding
+        return float(f"{value:.9g}")  # the last digits are rounding
     return {name: _rounded(item) for name, item in value.items()} if isinstance(value, dict) else value
 
 

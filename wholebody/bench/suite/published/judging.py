@@ -1,4 +1,4 @@
-"""What a file of answers is worth: every answer scored by the files alone, shares with intervals, and both in words."""
+"""The score of a file of answers: every answer scored by the files alone, shares with intervals, and both in words."""
 
 from __future__ import annotations
 

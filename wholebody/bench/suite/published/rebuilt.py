@@ -1,4 +1,4 @@
-"""A published problem, rebuilt from its files by Pinocchio and coal alone, and what a posture is worth for it."""
+"""A published problem, rebuilt from its files by Pinocchio and coal alone, and the score of a posture for it."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts 
 
 @dataclass(frozen=True)
 class Score:
-    """What a posture is worth for a problem.
+    """The score of a posture for a problem.
 
     The worst of goals [m], [rad]; of pairs: the deepest overlap and the largest shortfall [m]; of limits, and of what
     is held and balanced [m, rad]. `effort`: weighted squared displacement of joints and root from the start.

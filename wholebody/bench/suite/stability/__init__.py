@@ -1,1 +1,1 @@
-"""Where methods fail: a named catalogue of hard cases, what each method answers, and what that answer is worth."""
+"""Where methods fail: a named catalogue of hard cases, what each method answers, and the verdict on it."""

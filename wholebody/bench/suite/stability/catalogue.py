@@ -1,4 +1,4 @@
-"""Hard cases by name, from `cases.toml`: what is asked, why it is hard, and which answers are acceptable."""
+"""Hard cases by name, from `cases.toml`: the problem, why it is hard, and which answers are acceptable."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Stream:
-    """A goal to follow frame by frame with `wb.tracking.Drag`; every frame counts, and the way from one to the next.
+    """A goal to follow frame by frame with `wb.tracking.Drag`; every frame counts, and the motion from one to the next.
 
     The first goal, a `Point`, is the one that moves; no joint may move faster than `speed` [rad/s].
     """

@@ -26,7 +26,7 @@ WORDS: dict[Kind, str] = {
 
 
 class Verdict(NamedTuple):
-    """What one method's answer to one case is worth, and its worst figure in a few words."""
+    """The verdict on one method's answer to one case, and its worst figure."""
 
     kind: Kind
     figure: str
