@@ -73,7 +73,7 @@ def _beyond_no_face(table: PairTable, placements: Array, pairs: Indices, within:
     Half-spaces are beside everything in boxes along the axes of the world: each would be measured with all pieces.
     """
     endless = np.isinf(table.reach[pairs])
-    kept = ~endless.all(axis=1)
+    kept: Mask = np.asarray(~endless.all(axis=1))
     for plane in np.unique(pairs[endless]).tolist():
         rows = np.flatnonzero((pairs == plane).any(axis=1) & kept)
         other = pairs[rows].sum(axis=1) - plane
