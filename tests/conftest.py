@@ -30,6 +30,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.flesh import settle
 from wholebody.base.errors import WholebodyError
 from wholebody.figures import load, surface
 from wholebody.figures.description import Description
@@ -226,7 +227,9 @@ def _least_distance(scene: Scene, q: Any) -> float:
         for request in placed.distanceRequests:
             request.enable_cached_gjk_guess = False  # else an answer begins where the one before ended
         _LAID[scene] = scene.built, data, placed
-    nearest = pin.computeDistances(scene.model, data, scene.geometry, placed, np.asarray(q))
+    pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, np.asarray(q))
+    settle(scene.geometry, placed)
+    nearest = pin.computeDistances(scene.geometry, placed)
     return float(placed.distanceResults[nearest].min_distance) if len(placed.distanceResults) else np.inf
 
 

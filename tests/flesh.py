@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.geometry.flesh import SPREADS
+from wholebody.geometry.flesh import is_flesh
 
 
 def settle(geometry: pin.GeometryModel, placed: pin.GeometryData) -> None:
     """Move flesh to where the hip has it: spread from 60 degrees on, up to 30 in the thigh, between by a cubic."""
     for k, piece in enumerate(geometry.geometryObjects):
-        if piece.meshPath != SPREADS:
+        if not is_flesh(piece):
             continue
         front = piece.name.rpartition("/")[0]
         names = [one.name for one in geometry.geometryObjects]

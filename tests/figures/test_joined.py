@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.flesh import settle
 from wholebody.figures import join
 from wholebody.figures.self_pairs import random_postures
 
@@ -205,7 +206,10 @@ def test_penetration_between_figures_is_that_of_coal(alone: dict[str, wb.Figure]
     q = scene.figure.neutral
     found = {tuple(pair): depth for pair, depth in zip(*_overlaps(scene, q), strict=True)}
     data, pieces = scene.state(q).data, scene.geometry.geometryObjects
-    placed = [data.oMi[piece.parentJoint] * piece.placement for piece in pieces]
+    at = pin.GeometryData(scene.geometry)
+    pin.updateGeometryPlacements(scene.model, data, scene.geometry, at)
+    settle(scene.geometry, at)
+    placed = list(at.oMg)
     owner = [name.partition("/")[0] for name in scene.piece_owner]
     deepest = {}
     for a in range(len(pieces)):

@@ -8,6 +8,7 @@ import wholebody as wb
 from tests.measuring import measure
 from wholebody.assessment.all_pairs import AllPairs
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
+from wholebody.geometry.flesh import flesh_of
 
 
 def between_rails(figure: wb.Figure, gap: float, flexion: float) -> float:
@@ -72,3 +73,19 @@ def test_bounds_of_motions_hold_for_flesh() -> None:
         bounds.update(data, turn, np.array(space.placements(q))[:, 3])
         far = max(far, moved / bounds.speed[number].sum())
     assert 0.5 < far <= 1.0  # 1.03 without what flesh moves beside its limb
+
+
+@pytest.mark.parametrize("flexion", [0.2, 0.8, 1.5])
+def test_flesh_of_a_frozen_hip_is_where_that_of_the_whole_figure_is(flexion: float) -> None:
+    figure = wb.load("human")
+    model, geometry = figure.model, figure.geometry
+    q = figure.with_joints(figure.posture("standing"), {"left_hip_flexion": flexion, "left_hip_abduction": 0.1})
+    frozen = [model.getJointId(name) for name in model.names if "left_hip" in name]
+    reduced, reduced_geometry = pin.buildReducedModel(model, geometry, frozen, q)
+    kept = np.concatenate([range(j.idx_q, j.idx_q + j.nq) for j in list(model.joints)[1:] if j.id not in frozen])
+    places = []
+    for one, pieces, at in ((model, geometry, q), (reduced, reduced_geometry, q[kept.astype(int)])):
+        data = one.createData()
+        pin.forwardKinematics(one, data, at)
+        places += [flesh.placed(pieces, data.oMi).homogeneous for flesh in flesh_of(pieces)]
+    assert np.array(places[:2]) == pytest.approx(np.array(places[2:]), abs=1e-12)

@@ -36,7 +36,7 @@ def test_the_page_tells_what_is_shown(browser: Browser, tmp_path: Path) -> None:
         assert free["title"] == "A <hand>"
         assert free["status"].startswith("goals missed by at most 20.0 mm")
         assert free["status"].endswith("no overlap")
-        assert "goal, and the way to it" in free["legend"]
+        assert "goal, and the line to it" in free["legend"]
         assert "overlaps" not in free["legend"]
         assert len(free["colors"]) == len(free["legend"])
 
@@ -45,7 +45,7 @@ def test_the_page_tells_what_is_shown(browser: Browser, tmp_path: Path) -> None:
         assert viewer.sync(10.0)
         inside = browser.evaluate(_PANEL)
         assert "overlaps" in inside["legend"]
-        assert "goal, and the way to it" not in inside["legend"]
+        assert "goal, and the line to it" not in inside["legend"]
         depth = -min(scene.contacts(q, within=0.0).distance)
         assert inside["status"].endswith(f"deepest overlap {1e3 * depth:.1f} mm")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled, with_loops
@@ -215,10 +214,19 @@ def violation(mobility: Array, velocity: Array, friction: Array, target: Array, 
     return worst
 
 
+@compiled(error_model="numpy")
+def _by_cholesky(inertia: Array, momentum: Array) -> tuple[bool, Array]:
+    root, velocity = inertia.copy(), momentum.copy()
+    if not factorise(root):
+        return False, velocity
+    substitute(root, velocity)
+    return True, velocity
+
+
 def by_inertia(inertia: Array, momentum: Array) -> Array:
     """The velocities (n,) that an inertia (n, n), symmetric, has with a momentum (n,)."""
-    velocity, failed = lapack.dposv(inertia, momentum)[1:]
-    return np.asarray(np.linalg.solve(inertia, momentum) if failed else velocity)
+    known, velocity = _by_cholesky(np.ascontiguousarray(inertia), np.ascontiguousarray(momentum))
+    return np.asarray(velocity if known else np.linalg.solve(inertia, momentum))
 
 
 def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> tuple[Array, Array]:
@@ -262,6 +270,7 @@ def compiled_kernel(_: Any) -> None:
     """The loop."""
     eye, three, one = np.eye(3), np.zeros(3), np.zeros(1)
     mobilities(eye, eye)
+    _by_cholesky(eye, three)
     solve(eye, three, one, one, 1, 1e-9)
     _split(eye, np.ones(3), three, one, three.copy(), three.copy(), 1)
     violation(eye, three, one, one, np.zeros((1, 3)))

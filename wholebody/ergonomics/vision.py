@@ -161,7 +161,7 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str,
     data = scene.model.createData()
     placed = pin.GeometryData(scene.geometry)
     pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
-    for one in flesh_of(scene.model, scene.geometry):
+    for one in flesh_of(scene.geometry):
         placed.oMg[one.piece] = one.placed(scene.geometry, data.oMi)
     ahead = (target - eyes) / distance
     turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), ahead).matrix()

@@ -226,9 +226,9 @@ def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[
             solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
         )
         piece.meshColor[:] = SKIN
-        if solid.flesh:
-            mark_flesh(piece)
         index[solid.name] = geometry.addGeometryObject(piece)
+        if solid.flesh:
+            mark_flesh(model, geometry, index[solid.name])
     for a, b in pairs:
         geometry.addCollisionPair(pin.CollisionPair(*sorted((index[a], index[b]))))
     return geometry

@@ -16,7 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, cross
 
 SPREADS = "spreads"
-"""Mark of flesh, as the `meshPath` of its piece: Pinocchio copies it with the piece, and convex pieces have no file."""
+"""Mark of flesh, in the `meshPath` of its piece: Pinocchio copies it with the piece, and convex pieces have no file."""
 
 # Cosines of the angles of 30 and 60 degrees between the limb and what carries it, up to which the limb is straight, and
 # from which on it is bent: people walk with less, and sit with more (estimate).
@@ -25,9 +25,25 @@ STRAIGHT, BENT = 0.866, 0.5
 NUMBERS = 12  # of a placement: columns of the rotation, then the translation
 
 
-def mark_flesh(piece: pin.GeometryObject) -> None:
-    """Let a piece be flesh that spreads; the piece before it is the one in which it is otherwise."""
-    piece.meshPath = SPREADS
+def mark_flesh(model: pin.Model, geometry: pin.GeometryModel, number: int) -> None:
+    """Let a piece be flesh that spreads out of the piece before it, against the first piece of what carries the limb."""
+    pieces = geometry.geometryObjects
+    first: dict[int, int] = {}
+    for k, piece in enumerate(pieces):
+        first.setdefault(int(piece.parentJoint), k)
+    joint = int(model.parents[pieces[number].parentJoint])
+    while joint and joint not in first:
+        joint = int(model.parents[joint])
+    trunk = pieces[first[joint]]
+    up, along = trunk.placement.rotation[2], pieces[number - 1].placement.rotation[2, 2]
+    column = int(np.argmax(np.abs(up)))
+    # by name, as joints of a reduced model are others
+    pieces[number].meshPath = f"{SPREADS} {trunk.name} {column} {np.sign(up[column] * along):.0f}"
+
+
+def is_flesh(piece: pin.GeometryObject) -> bool:
+    """Whether a piece is flesh."""
+    return str(piece.meshPath).startswith(SPREADS)
 
 
 class Flesh(NamedTuple):
@@ -72,30 +88,23 @@ def beside_limbs(pieces: Sequence[pin.GeometryObject], reach: Array) -> Array:
     """(n,) most that pieces of reach (n,) move a radian beside what their joints move them by, m: 0 but for flesh."""
     most, rate = np.zeros(len(pieces)), 1.5 / (STRAIGHT - BENT) * np.sqrt(1.0 - BENT**2)  # of the share, a radian
     for k, piece in enumerate(pieces):
-        if piece.meshPath == SPREADS:
+        if is_flesh(piece):
             moved = pieces[k - 1].placement.actInv(piece.placement)
             turned = np.linalg.norm(moved.rotation - np.eye(3), 2)
             most[k] = rate * (np.linalg.norm(moved.translation) + turned * reach[k])
     return most
 
 
-def flesh_of(model: pin.Model, geometry: pin.GeometryModel) -> tuple[Flesh, ...]:
+def flesh_of(geometry: pin.GeometryModel) -> tuple[Flesh, ...]:
     """Flesh among the pieces of a geometry model."""
-    pieces = geometry.geometryObjects
-    marked = [k for k, piece in enumerate(pieces) if piece.meshPath == SPREADS]
-    first: dict[int, int] = {}
-    for k, piece in enumerate(pieces) if marked else ():
-        first.setdefault(int(piece.parentJoint), k)
-    found = []
+    pieces, found = geometry.geometryObjects, []
+    marked = [k for k, piece in enumerate(pieces) if is_flesh(piece)]
+    numbers = {piece.name: k for k, piece in enumerate(pieces)} if marked else {}
     for k in marked:
-        joint = int(model.parents[pieces[k].parentJoint])
-        while joint and joint not in first:
-            joint = int(model.parents[joint])
-        trunk = first[joint]
-        up, along = pieces[trunk].placement.rotation[2], pieces[k - 1].placement.rotation[2, 2]
-        column = int(np.argmax(np.abs(up)))
-        limb = NUMBERS * (k - 1) + 6  # a capsule's axis is the last column
-        found.append(Flesh(k, limb, NUMBERS * trunk + 3 * column, float(np.sign(up[column] * along))))
+        _, name, column, sign = pieces[k].meshPath.split(" ")
+        own, slash, _ = pieces[k].name.rpartition("/")
+        trunk = NUMBERS * numbers[own + slash + name] + 3 * int(column)
+        found.append(Flesh(k, NUMBERS * (k - 1) + 6, trunk, float(sign)))  # a capsule's axis is the last column
     return tuple(found)
 
 

@@ -86,7 +86,7 @@ class PairDistances:
             self.placed = self._copied()
         flesh = self._flesh
         if flesh is None:
-            flesh = self._flesh = flesh_of(model, self.geometry)
+            flesh = self._flesh = flesh_of(self.geometry)
         if flesh:
             if not self._viewed or self._flat is None:
                 self._flat = self.placed.data.cast("B").cast("d")

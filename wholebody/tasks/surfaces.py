@@ -171,7 +171,7 @@ def _of_pieces(scene: Scene, name: str, indices: Sequence[int]) -> Surface:
     owners = tuple(dict.fromkeys(scene.piece_owner[k] for k in indices))
 
     def made() -> Surface:
-        flesh = {one.piece: one for one in flesh_of(scene.model, scene.geometry)}
+        flesh = {one.piece: one for one in flesh_of(scene.geometry)}
         spread = tuple((number, flesh[index]) for number, index in enumerate(indices) if index in flesh)
         return with_values(_made(name, owners, scene.geometry, indices), flesh=spread)
 

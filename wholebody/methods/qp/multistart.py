@@ -266,13 +266,15 @@ class Multistart(Search):
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
         if not self.settings.restarts:
             return
+        begun = 2 * len(self.trace) + SEARCH.cheap
         least, tried = (self._through_measure, 0) if self._through_measure else self._below_things()
         more = int(not (tried or count or self._touches))  # a descent to a contact takes ten times as long
         rng = np.random.default_rng([self.settings.seed, count + 1])
         starts = restarts(*given, rng, self.settings.restarts)
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
-            if number >= more + (0 if self._touches else int(SEARCH.dear * dear)) or self.control.over:
+            most = more + (0 if self._touches else int(SEARCH.dear * dear))
+            if number >= most or len(self.trace) > begun or self.control.over:
                 break
             self._lower(q)
 

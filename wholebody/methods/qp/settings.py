@@ -178,6 +178,7 @@ class SearchNumbers(NamedTuple):
     screened: int = 4  # feasible postures that are looked for, for each descended from. More: lower measures, slower.
     # starts that seek lower minima, for each factor e that things multiply the measures by. More: lower, slower.
     dear: float = 3.0
+    cheap: int = 60  # programs that starts for lower measures may take beside as many as before. More: lower, slower.
     width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
     less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
     less_of_contacts: float = 0.5  # the same where terms are contacts, whose descents take ten times as long
