@@ -26,7 +26,7 @@ NUMBERS = 12  # of a placement: columns of the rotation, then the translation
 
 
 def mark_flesh(model: pin.Model, geometry: pin.GeometryModel, number: int) -> None:
-    """Let a piece be flesh that spreads out of the piece before it, against the first piece of what carries the limb."""
+    """Let a piece be flesh that spreads out of the piece before it, against the first piece of what carries it."""
     pieces = geometry.geometryObjects
     first: dict[int, int] = {}
     for k, piece in enumerate(pieces):
