@@ -37,8 +37,8 @@ def mark_flesh(model: pin.Model, geometry: pin.GeometryModel, number: int) -> No
     trunk = pieces[first[joint]]
     up, along = trunk.placement.rotation[2], pieces[number - 1].placement.rotation[2, 2]
     column = int(np.argmax(np.abs(up)))
-    # by name, as joints of a reduced model are others
-    pieces[number].meshPath = f"{SPREADS} {trunk.name} {column} {np.sign(up[column] * along):.0f}"
+    # by number, as joints of a reduced model and names of outer pieces are others
+    pieces[number].meshPath = f"{SPREADS} {number - first[joint]} {column} {np.sign(up[column] * along):.0f}"
 
 
 def is_flesh(piece: pin.GeometryObject) -> bool:
@@ -98,13 +98,10 @@ def beside_limbs(pieces: Sequence[pin.GeometryObject], reach: Array) -> Array:
 def flesh_of(geometry: pin.GeometryModel) -> tuple[Flesh, ...]:
     """Flesh among the pieces of a geometry model."""
     pieces, found = geometry.geometryObjects, []
-    marked = [k for k, piece in enumerate(pieces) if is_flesh(piece)]
-    numbers = {piece.name: k for k, piece in enumerate(pieces)} if marked else {}
-    for k in marked:
-        _, name, column, sign = pieces[k].meshPath.split(" ")
-        own, slash, _ = pieces[k].name.rpartition("/")
-        trunk = NUMBERS * numbers[own + slash + name] + 3 * int(column)
-        found.append(Flesh(k, NUMBERS * (k - 1) + 6, trunk, float(sign)))  # a capsule's axis is the last column
+    for k in [k for k, piece in enumerate(pieces) if is_flesh(piece)]:
+        back, column, sign = (int(number) for number in pieces[k].meshPath.split(" ")[1:])
+        trunk = NUMBERS * (k - back) + 3 * column
+        found.append(Flesh(k, NUMBERS * (k - 1) + 6, trunk, sign))  # a capsule's axis is the last column
     return tuple(found)
 
 
