@@ -15,6 +15,7 @@ import pytest
 import trimesh
 
 import wholebody as wb
+from tests.flesh import settle
 from wholebody.cli import main
 from wholebody.figures.surface import surface_of
 from wholebody.figures.surface.making import halfway
@@ -26,18 +27,20 @@ UP = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0],
 """From our x forward, z up to glTF's z forward, y up."""
 
 
-def test_pieces_and_things_are_where_pinocchio_says(tmp_path: Path) -> None:
+@pytest.mark.parametrize("posture", ["sitting", "standing"])
+def test_pieces_and_things_are_where_pinocchio_says(tmp_path: Path, posture: str) -> None:
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.6, 1.2, 0.04)), name="table", at=(0.65, 0.0, 0.74), color=(0.2, 0.3, 0.8, 0.5))
     scene.add(wb.Cylinder(0.05, 0.2), name="cup", at=(0.5, 0.2, 0.87))
     scene.attach(wb.Sphere(0.03), name="ball", to="right_hand", at=(0.0, 0.0, -0.2))
-    q = scene.figure.with_joints(scene.figure.posture("sitting"), {"left_elbow_flexion": 1.1, "spine1_flexion": 0.3})
+    q = scene.figure.with_joints(scene.figure.posture(posture), {"left_elbow_flexion": 1.1, "spine1_flexion": 0.3})
     with wb.Viewer(scene) as viewer:
         viewer.show(q, pieces=True)
         written = viewer.save(tmp_path / "scene.glb")
     loaded = trimesh.load_scene(written)
     data, results = scene.model.createData(), pin.GeometryData(scene.geometry)
     pin.updateGeometryPlacements(scene.model, data, scene.geometry, results, q)
+    settle(scene.geometry, results)
     pieces = scene.geometry.geometryObjects
     for piece, at in zip(pieces, results.oMg, strict=True):
         matrix, mesh = loaded.graph.get(f"piece {piece.name}")

@@ -105,6 +105,15 @@ def flesh_of(geometry: pin.GeometryModel) -> tuple[Flesh, ...]:
     return tuple(found)
 
 
+def in_joints(geometry: pin.GeometryModel, joints: Any) -> dict[int, Array]:
+    """Placements (4, 4) in their joints of the pieces of flesh, by their numbers, with the joints at Pinocchio's."""
+    pieces = geometry.geometryObjects
+    return {
+        flesh.piece: (joints[pieces[flesh.piece].parentJoint].inverse() * flesh.placed(geometry, joints)).homogeneous
+        for flesh in flesh_of(geometry)
+    }
+
+
 def between(straight: Array, bent: Array, share: float) -> Array:
     """A placement (4, 3), columns of the rotation and the translation, between two that differ by a small angle."""
     mixed = straight + share * (bent - straight)

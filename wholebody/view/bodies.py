@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
 from wholebody.figures.link_pieces import drawn_of
 from wholebody.figures.surface import Surface, surface_of
+from wholebody.geometry.flesh import in_joints
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import commands, drawing, style
 from wholebody.view.scene_graph import Keyframe, SceneGraph, crowds
@@ -21,7 +23,7 @@ from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
 
 
 class Skinned(NamedTuple):
-    """One drawn patch: its node, segment and color."""
+    """One drawn patch."""
 
     path: str
     segment: str
@@ -47,15 +49,10 @@ class Skin:
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the surface at a node, moved by the nodes of its joints; in a colour, or each patch in its own."""
         bones = self.surface.bones
-        graph.do(
-            commands.set_skeleton(
-                root,
-                [carriers[joint] for joint, _ in self.places],
-                np.array([offset for _, offset in self.places]),
-                np.linalg.inv(np.array([bone.bind for bone in bones])),
-                [(*half, *bones[half[0]].slide) for half in self.surface.halves],
-            )
-        )
+        halves = [(*half, *bones[half[0]].slide) for half in self.surface.halves]
+        places, binds = np.array([offset for _, offset in self.places]), np.array([bone.bind for bone in bones])
+        nodes = [carriers[joint] for joint, _ in self.places]
+        graph.do(commands.set_skeleton(root, nodes, places, np.linalg.inv(binds), halves))
         drawn = []
         for patch in self.surface.patches:
             shown: Color = (*patch.color, 1.0) if color is None else color
@@ -98,24 +95,15 @@ class LinkVisuals:
 
 @dataclass(frozen=True)
 class Body:
-    """One drawn piece.
+    """One drawn piece."""
 
-    Attributes:
-        carrier, path: nodes of its joint, and of the piece below it.
-        joint: index of the joint.
-        thing: name of its object; None for a piece of the figure.
-        color: its color without contact.
-        plate: whether it is a half-space, which is drawn as a plate.
-        corners: (8, 3) of the box around it, in its own axes, metres.
-    """
-
-    carrier: str
-    path: str
+    carrier: str  # node of its joint
+    path: str  # of the piece below that
     joint: int
-    thing: str | None
-    color: Color
-    plate: bool
-    corners: Array
+    thing: str | None  # name of its object; None for a piece of the figure
+    color: Color  # without contact
+    plate: bool  # whether it is a half-space, which is drawn as a plate
+    corners: Array  # (8, 3) of the box around it, in its own axes, metres
 
     def state_color(self, state: Color) -> Color:
         """Colour in contact: the figure's pieces take this colour, things are tinted, half-spaces keep theirs."""
@@ -285,6 +273,8 @@ class Bodies:
         for index in self._things:
             if index not in self._among:
                 keyframe.transforms[self.all[index].path] = pieces[index].placement.homogeneous
+        for index, place in in_joints(self.scene.geometry, data.oMi).items() if self.pieces else ():
+            keyframe.transforms[self.all[index].path] = place
         for crowd in self._crowds:
             keyframe.crowds[crowd.path] = crowd.at(pieces)
         for index, body in enumerate(self.all):
@@ -394,7 +384,11 @@ def scene_glb(scene: ViewedScene, bodies: Bodies, postures: Array, dt: float, ti
             tree.skin(name, figure.visual.surface, figure.visual.places, figure.prefix, figure.color)
         else:
             tree.visuals(figure.visual.drawn, figure.prefix, figure.color)
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, postures[0])
+    flesh = in_joints(scene.geometry, data.oMi)  # it does not spread within a motion there
     for index, (piece, body) in enumerate(zip(scene.geometry.geometryObjects, bodies.all, strict=True)):
         if not bodies.hidden(index):
-            tree.piece(f"piece {piece.name}", body.joint, piece.placement.homogeneous, piece.geometry, body.color)
+            at = flesh.get(index, piece.placement.homogeneous)
+            tree.piece(f"piece {piece.name}", body.joint, at, piece.geometry, body.color)
     return tree.builder.glb(title)
