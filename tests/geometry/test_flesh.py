@@ -8,7 +8,7 @@ import wholebody as wb
 from tests.measuring import measure
 from wholebody.assessment.all_pairs import AllPairs
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.flesh import flesh_of
+from wholebody.geometry.flesh import flesh_of, settled
 
 
 def between_rails(figure: wb.Figure, gap: float, flexion: float) -> float:
@@ -89,3 +89,12 @@ def test_flesh_of_a_frozen_hip_is_where_that_of_the_whole_figure_is(flexion: flo
         pin.forwardKinematics(one, data, at)
         places += [flesh.placed(pieces, data.oMi).homogeneous for flesh in flesh_of(pieces)]
     assert np.array(places[:2]) == pytest.approx(np.array(places[2:]), abs=1e-12)
+
+
+def test_programs_to_which_pieces_are_rigid_get_flesh_of_a_posture() -> None:
+    figure = wb.load("human")
+    names = [piece.name for piece in figure.geometry.geometryObjects]
+    thigh, flesh = (names.index(f"left_thigh:{number}") for number in (0, 3))
+    for posture, same in (("standing", thigh), ("sitting", flesh)):
+        rigid = settled(figure.model, figure.geometry, figure.posture(posture)).geometryObjects[flesh].placement
+        assert rigid.isApprox(figure.geometry.geometryObjects[same].placement, 1e-9)

@@ -114,6 +114,15 @@ def in_joints(geometry: pin.GeometryModel, joints: Any) -> dict[int, Array]:
     }
 
 
+def settled(model: pin.Model, geometry: pin.GeometryModel, q: Array) -> pin.GeometryModel:
+    """The geometry model for programs to which all pieces are rigid: with flesh where it is at the posture q (nq,)."""
+    data, made = model.createData(), geometry.copy()
+    pin.forwardKinematics(model, data, q)
+    for number, place in in_joints(geometry, data.oMi).items():
+        made.geometryObjects[number].placement = pin.SE3(place)
+    return made
+
+
 def between(straight: Array, bent: Array, share: float) -> Array:
     """A placement (4, 3), columns of the rotation and the translation, between two that differ by a small angle."""
     mixed = straight + share * (bent - straight)

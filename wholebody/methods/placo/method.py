@@ -9,6 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
+from wholebody.geometry.flesh import settled
 from wholebody.methods.base import Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import BUDGET, Control
@@ -103,7 +104,7 @@ class _RobotCache:
         if self._robot is None or not self._robot.serves(problem, frames, pairs):
             self._robot = Robot(problem.scene.figure, frames)
             self._robot.add_pieces(problem, pairs)
-        self._robot.place_objects(workspace.geometry)
+        self._robot.place_objects(settled(workspace.model, workspace.geometry, problem.start))
         return self._robot
 
 

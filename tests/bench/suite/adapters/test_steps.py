@@ -122,7 +122,7 @@ def test_mujoco_has_the_same_human(short_free: Track) -> None:
         for name in frames:
             assert np.allclose(data.site(name).xpos, state.frame(figure.frame_id(name)).translation, atol=1e-9)
         near = scene.contacts(q, within=0.05)
-        # flesh, which spreads as hips bend, is as on a seat there
+        # flesh, which spreads as hips bend, is rigid there
         flesh = [number for number, piece in enumerate(scene.geometry.geometryObjects) if is_flesh(piece)]
         apart = (near.distance > 1e-3) & ~np.isin(near.pair, flesh).any(axis=1)
         names = scene.piece_names

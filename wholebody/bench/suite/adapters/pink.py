@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import SETTING, Track
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY
 from wholebody.bench.suite.adapters.loop import Loop, Stepper, TaskStepper, TaskTool, kept_apart, longest_moves, size
+from wholebody.geometry.flesh import settled
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
@@ -58,7 +59,8 @@ class _PinkStepper(TaskStepper):
 
     def begin(self, room: float) -> None:
         """Place the pieces, and make the tasks anew."""
-        ours = self._problem.scene.geometry.geometryObjects
+        scene = self._problem.scene
+        ours = settled(scene.model, scene.geometry, self._problem.start).geometryObjects
         for number, (piece, shift) in enumerate(self._pieces):
             self._geometry.geometryObjects[number].placement = ours[piece].placement * shift
         self._room = room
@@ -151,7 +153,8 @@ class PinkTool(TaskTool):
         from pink.barriers import SelfCollisionBarrier
 
         self._package = pink
-        self._geometry, self._model = track.scene.geometry, track.scene.model.copy()
+        self._model = track.scene.model.copy()
+        self._geometry = settled(self._model, track.scene.geometry, track.start)
         self._model.velocityLimit = np.full(self._model.nv, SETTING.joint_speed)
         if track.floating:
             _bound_root(self._model, SETTING.root_speed, SETTING.root_turn)

@@ -14,6 +14,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.bench.measure.track import SETTING, Track
 from wholebody.bench.suite.adapters.base import Tool
 from wholebody.bench.suite.adapters.urdf import own_frame
+from wholebody.geometry.flesh import settled
 from wholebody.methods.placo.method import Placo
 from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
@@ -37,7 +38,7 @@ class PlacoTool(Tool):
     def __init__(self, track: Track) -> None:
         import placo
 
-        figure, scene = track.scene.figure, track.scene.geometry
+        figure, scene = track.scene.figure, settled(track.scene.model, track.scene.geometry, track.start)
         self._robot = Robot(figure, {name: own_frame(figure, name) for name in (track.tip, *track.feet)})
         wrapper = self._robot.wrapper
         pieces = wrapper.collision_model

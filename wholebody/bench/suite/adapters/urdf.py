@@ -15,6 +15,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, exact, urdf_axis
+from wholebody.geometry.flesh import settled
 from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import Place
 
@@ -48,7 +49,7 @@ def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
     """Return a scene as MJCF: bodies named after joints, geoms after pieces, sites after `frames`."""
     # Links without mass get a millionth of a kilogram, because MuJoCo refuses moving bodies without mass.
-    model, geometry = scene.model, scene.geometry
+    model, geometry = scene.model, settled(scene.model, scene.geometry, scene.figure.neutral)
     top = ElementTree.Element("mujoco", model=scene.figure.name)
     settings = {"angle": "radian", "autolimits": "true", "boundmass": "1e-6", "boundinertia": "1e-9"}
     ElementTree.SubElement(top, "compiler", settings | {"balanceinertia": "true"})

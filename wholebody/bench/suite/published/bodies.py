@@ -21,6 +21,7 @@ from wholebody.bench.suite.published.rebuilt import SHAPES, VERSION, model_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.figures.urdf.writing import add_joint, add_model_joint, exact, urdf_axis
+from wholebody.geometry.flesh import settled
 
 Meshes = dict[str, str]
 """Text of OBJ files by their path below the folder of an export."""
@@ -71,7 +72,8 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
         raise InputError(f"{name}: joints of it follow others, which a published body does not say; leave it out")
     model = figure.model
     links = _links(model)
-    text = _urdf(figure, name, links, meshes)
+    geometry = settled(model, figure.geometry, figure.neutral)
+    text = _urdf(figure, geometry, name, links, meshes)
     read = model_of(text, figure.root)
     order = _order(figure, read)
     joints = [joint for joint in read.names if joint != "universe" and joint in figure.joints]
@@ -97,11 +99,11 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
                 "pose": pose_of(piece.placement),
                 "shape": described(piece.geometry, meshes, f"{name}-{piece.name}"),
             }
-            for piece in figure.geometry.geometryObjects
+            for piece in geometry.geometryObjects
         ],
         "pairs": [
-            [figure.geometry.geometryObjects[pair.first].name, figure.geometry.geometryObjects[pair.second].name]
-            for pair in figure.geometry.collisionPairs
+            [geometry.geometryObjects[pair.first].name, geometry.geometryObjects[pair.second].name]
+            for pair in geometry.collisionPairs
         ],
     }
     return BodyFiles(name, text, content, order, links)
@@ -117,7 +119,7 @@ def _links(model: pin.Model) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _urdf(figure: Figure, name: str, links: tuple[str, ...], meshes: Meshes) -> str:
+def _urdf(figure: Figure, geometry: pin.GeometryModel, name: str, links: tuple[str, ...], meshes: Meshes) -> str:
     """A link for each joint with its pieces, the joints, and a link without mass for each further frame."""
     model = figure.model
     first = 1 if figure.root == "free" else 0
@@ -126,7 +128,7 @@ def _urdf(figure: Figure, name: str, links: tuple[str, ...], meshes: Meshes) -> 
         link = ElementTree.SubElement(top, "link", name=links[joint])
         if joint and model.inertias[joint].mass >= 1e-6:  # kg: less has a link that is only a place
             _add_inertia(link, model.inertias[joint])
-        for piece in figure.geometry.geometryObjects:
+        for piece in geometry.geometryObjects:
             if piece.parentJoint == joint:
                 _add_piece(link, piece, meshes, name)
     for joint in range(first + 1, model.njoints):
