@@ -17,6 +17,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
+from wholebody.geometry.flesh import in_joints
 from wholebody.geometry.pieces import box_corners
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
@@ -119,7 +120,7 @@ class Pairs:
 
     def __init__(self, scene: Scene) -> None:
         figure = scene.figure
-        self._model, self._data = figure.model, figure.model.createData()
+        self._model, self._data, self._geometry = figure.model, figure.model.createData(), scene.geometry
         self._request = coal.DistanceRequest()
         self._pieces: list[tuple[str, int, pin.SE3, Any]] = [
             (self._model.frames[piece.parentFrame].name, int(piece.parentJoint), piece.placement, piece.geometry)
@@ -140,8 +141,9 @@ class Pairs:
     def distances(self, q: Array) -> Array:
         """Signed distances (pairs,) at a posture (nq,), metres."""
         pin.forwardKinematics(self._model, self._data, q)
-        placed = []
-        for _, joint, place, geometry in self._pieces:
+        placed, flesh = [], in_joints(self._geometry, self._data.oMi)  # the figure's pieces come first in both
+        for number, (_, joint, place, geometry) in enumerate(self._pieces):
+            place = pin.SE3(flesh[number]) if number in flesh else place
             there = self._data.oMi[joint] * place if joint else place
             placed.append((geometry, coal.Transform3s(there.rotation, there.translation)))
         found = np.empty(len(self._pairs))
