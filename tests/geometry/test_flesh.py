@@ -98,3 +98,13 @@ def test_programs_to_which_pieces_are_rigid_get_flesh_of_a_posture() -> None:
     for posture, same in (("standing", thigh), ("sitting", flesh)):
         rigid = settled(figure.model, figure.geometry, figure.posture(posture)).geometryObjects[flesh].placement
         assert rigid.isApprox(figure.geometry.geometryObjects[same].placement, 1e-9)
+
+
+def test_flesh_meets_what_stands_in_the_world_and_not_what_is_worn() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.Box((0.1, 0.1, 0.1)), name="rail", at=(0.0, 0.5, 0.9))
+    scene.attach(wb.Box((0.05, 0.05, 0.1)), to="pelvis", name="pouch", at=(0.0, 0.25, 0.0))
+    names = scene.piece_names
+    met = {frozenset((names[a], names[b])) for a, b in scene.pair_table.pairs.tolist()}
+    flesh = "left_thigh:3"
+    assert {frozenset((flesh, "rail:0"))} == {pair for pair in met if flesh in pair}
+    assert frozenset(("left_thigh:0", "pouch:0")) in met

@@ -17,6 +17,7 @@ from wholebody.base.arrays import Indices, Mask, brief
 from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
+from wholebody.geometry.flesh import is_flesh
 from wholebody.geometry.large_models import geometry_model, pairs_of
 from wholebody.geometry.pieces import SweptPoints
 from wholebody.geometry.proximity import PairTable, Proximity
@@ -221,6 +222,9 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
         if one.name in carried:
             excluded[one.name, other.name] = "two half-spaces, which have no end"
     met = _pairs_of_things(body, joints, owners, excluded)
+    flesh = [k for k, piece in enumerate(pieces[:own]) if is_flesh(piece)]
+    # what is worn lies on the flesh, and goes with it
+    met = met[~(np.isin(met[:, 0], flesh) & (joints[met[:, 1]] > 0))]
     if body > own:
         outer, standing = (met[:, 0] >= own) & (met[:, 0] < body), joints[met[:, 1]] == 0
         met = met[(met[:, 0] >= body) | (outer == standing)]
