@@ -42,6 +42,17 @@ def test_what_is_around_the_robot_becomes_things(path: Path) -> None:
     assert mug.mass == pytest.approx(0.4)
 
 
+def test_a_free_thing_may_have_its_shapes_in_a_part_of_it(tmp_path: Path) -> None:
+    """Gymnasium's kitchen has a kettle whose outermost body has no geom."""
+    kettle = """<body name="kettle" pos="0 0 1"><freejoint/>
+      <body pos="0 0.1 0"><geom size="0.05" mass="0.2" rgba="1 0 0 1"/></body></body></worldbody>"""
+    path = tmp_path / "kitchen.xml"
+    path.write_text(CELL.replace("</worldbody>", kettle))
+    thing = wb.read_scene(path).objects["kettle"]
+    assert thing.color[:3] == pytest.approx((1.0, 0.0, 0.0))
+    assert np.allclose(thing.placement.translation, (0.0, 0.1, 1.0))
+
+
 def test_distances_are_mujocos(path: Path) -> None:
     scene, model = wb.read_scene(path), mujoco.MjModel.from_xml_path(str(path))
     theirs, q = mujoco.MjData(model), scene.figure.with_joints(scene.figure.neutral, {"turn": 0.7})

@@ -76,9 +76,9 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
             continue
         parts = _parts(compiled, top, left)
         if parts:
-            shape = parts[0][0] if len(parts) == 1 else Compound(tuple(parts))
+            shape = parts[0][0] if len(parts) == 1 else Compound(tuple(part[:2] for part in parts))
             at = compiled.place(top) * (parts[0][1] if len(parts) == 1 else pin.SE3.Identity())
-            color = compiled.color(compiled.geoms(top)[0])
+            color = compiled.color(parts[0][2])
             mass = float(model.body_subtreemass[top])
             scene.add(shape, name=_free_name(scene, names["body"][top]), at=at, body=Body(mass=mass), color=color)
     if left:
@@ -100,8 +100,8 @@ def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left
         scene.add(shape, name=_free_name(scene, name), at=place * at, color=compiled.color(geom))
 
 
-def _parts(compiled: Compiled, top: int, left: list[str]) -> list[tuple[Shape, pin.SE3]]:
-    """Shapes of a body and those that hang on it, which move as one, in its frame."""
+def _parts(compiled: Compiled, top: int, left: list[str]) -> list[tuple[Shape, pin.SE3, int]]:
+    """Shapes of a body and of those that hang on it, which move as one, with their placements in its frame and geoms."""
     found = []
     for body, place in compiled.places(top, pin.SE3.Identity()).items():
         for geom in filter(compiled.collides, compiled.geoms(body)):
@@ -109,7 +109,7 @@ def _parts(compiled: Compiled, top: int, left: list[str]) -> list[tuple[Shape, p
             if made is None or isinstance(made[0], HalfSpace):
                 left.append(compiled.names["geom"][geom])
             else:
-                found.append((made[0], place * made[1]))
+                found.append((made[0], place * made[1], geom))
     return found
 
 

@@ -225,6 +225,7 @@ WRONG = {
     "a long name": (ARM.replace('type="slide"', f'class="{"c" * 300}"'), "MuJoCo cannot read it .*unknown default"),
     "broken": (ARM[:-40], "MuJoCo cannot read it"),
     "another file": ("<scene/>", "<scene>, not <robot>"),
+    "a part of a file": ("<mujocoinclude/>", "<mujocoinclude>, not <robot>; load the MJCF file that includes it"),
 }
 
 

@@ -345,6 +345,16 @@ def test_a_velocity_limit_of_zero_is_none_and_told(tmp_path, zero):
     assert (arm.model.velocityLimit > 0.0).all()
 
 
+def test_a_limit_of_minus_one_is_none_and_told(tmp_path):
+    """Exporters write -1 for no limit, as Halodi's eve_r3 has it."""
+    text = TEXT.replace('effort="100" velocity="2"/>', 'effort="-1" velocity="-1"/>', 1)
+    arm = load(write(tmp_path, text), package_dirs=[ARM.parents[1]])
+    told = [note for note in arm.notes if "limit is -1, which is read as none" in note]
+    assert len(told) == 2
+    index = arm.dofs([told[0].split("'")[1]])[0]
+    assert (arm.model.velocityLimit[index], arm.model.effortLimit[index]) == (np.inf, np.inf)
+
+
 def test_a_joint_whose_upper_limit_is_minus_zero_is_one_that_does_not_move(tmp_path):
     """`-0.0` is not below `0.0`, and numpy refuses to draw numbers between the two."""
     path = tmp_path / "robot.urdf"

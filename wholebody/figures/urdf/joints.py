@@ -112,11 +112,12 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
             notes.append(f"joint {shown(name)}: it has no <limit>, so it moves without limits")
         return free
     lower, upper = (-np.inf, np.inf) if kind == "continuous" else _range(limit, kind, place, shown(name), notes)
-    velocity, effort = (_most(limit, what, place) for what in ("velocity", "effort"))
-    if velocity == 0.0:  # exporters write 0 where no speed was stated
-        notes.append(f"joint {shown(name)}: its velocity limit is 0, which is read as none")
-        velocity = np.inf
-    return lower, upper, velocity, effort
+    most = {what: _most(limit, what, place) for what in ("velocity", "effort")}
+    # exporters write 0 and -1 where no speed was stated, and -1 where no effort was; a passive joint has effort 0
+    for what in [what for what, value in most.items() if value == -1.0 or (value == 0.0 and what == "velocity")]:
+        notes.append(f"joint {shown(name)}: its {what} limit is {most[what] + 0.0:g}, which is read as none")
+        most[what] = np.inf
+    return lower, upper, most["velocity"], most["effort"]
 
 
 def _range(limit: Element, kind: str, place: str, name: str, notes: list[str]) -> tuple[float, float]:
@@ -133,12 +134,12 @@ def _range(limit: Element, kind: str, place: str, name: str, notes: list[str]) -
 
 
 def _most(limit: Element, what: str, place: str) -> float:
-    """Largest velocity or effort; infinite for none."""
+    """Largest velocity or effort; infinite for none, -1 where the file has it."""
     text = limit.get(what)
     if text is None or text.strip().lower().lstrip("+") in ("inf", "infinity"):
         return np.inf
     value = bounded(limit, what, place, 1, most=1e20)[0]
-    if value < 0.0:
+    if value < 0.0 and value != -1.0:
         raise FileFormatError(f"{place} has the {what} limit {value:g}; give a number that is not negative")
     return value
 

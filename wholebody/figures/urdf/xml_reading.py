@@ -40,8 +40,8 @@ def read_robot(path: Path, kind: str) -> Element:
     """Return the `<robot>` of a "URDF" or an "SRDF"."""
     robot = read_xml(path, kind)
     if robot.tag != "robot":
-        article = "an" if kind == "SRDF" else "a"
-        raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give {article} {kind}")
+        mend = {"mujocoinclude": "load the MJCF file that includes it"}.get(robot.tag, f"give a robot's {kind}")
+        raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; {mend}")
     if path.suffix == ".xacro" or robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
         raise FileFormatError(
             f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.{kind.lower()}`"
