@@ -101,7 +101,7 @@ def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left
 
 
 def _parts(compiled: Compiled, top: int, left: list[str]) -> list[tuple[Shape, pin.SE3, int]]:
-    """Shapes of a body and of those that hang on it, which move as one, with their placements in its frame and geoms."""
+    """Shapes of a body and of those on it, which move as one, with their placements in its frame and their geoms."""
     found = []
     for body, place in compiled.places(top, pin.SE3.Identity()).items():
         for geom in filter(compiled.collides, compiled.geoms(body)):
