@@ -20,7 +20,7 @@ class HeadShape(NamedTuple):
     skin: Field
     hair: Field
     eyes: Field
-    lids: Field
+    front: Field  # of the face, with lids and lips, which are too thin for the mesh of the whole head
     irises: Field
     brows: Field
     lips: Field
@@ -38,10 +38,24 @@ def head_shape(size: Dimensions) -> HeadShape:
         return lambda points: field((points - origin) / scale) * least
 
     female = size.body.sex == "female"
-    # upper and lower lids are too thin for the head's own mesh: without them eyes stare
-    lids = without(_part("lids"), _part("slits"), 0.002)
-    parts = _face(female), _hair(female), _part("eyes"), lids, _part("irises"), _part("brows"), _part("lips")
+    face = _face(female)
+    lidded = without(union([face, _part("lids")], 0.008), _part("slits"), 0.0015)
+    fine = union([lidded, _part("lips")], 0.006)
+    # each stands over the head's own mesh, and goes under it at its border
+    front, lips = _inlaid(fine, _part("front"), 0.0004, 0.025), _inlaid(fine, _part("reds"), 0.0013, 0.0)
+    parts = face, _hair(female), _part("eyes"), front, _part("irises"), _part("brows"), lips
     return HeadShape(*map(stretched, parts))
+
+
+def _inlaid(field: Field, region: Field, above: float, fade: float) -> Field:
+    """What is in a solid and in a region, `above` the solid's surface, below it outside; so flat that no edge shows."""
+
+    def inlaid(points: Array) -> Array:
+        out = region(points)
+        under = 0.05 * np.maximum(out + fade, 0.0) + np.maximum(out, 0.0) - above
+        return np.asarray(np.maximum(field(points) + under, out - 0.004))
+
+    return inlaid
 
 
 def _face(female: bool) -> Field:

@@ -39,7 +39,7 @@ class _Colors(NamedTuple):
 
     skin: Color = (0.86, 0.66, 0.54)
     hair: Color = (0.25, 0.17, 0.12)
-    lips: Color = (0.72, 0.42, 0.38)
+    lips: Color = (0.76, 0.50, 0.44)
     shirt: Color = (0.42, 0.55, 0.68)
     trousers: Color = (0.27, 0.30, 0.38)
     shoes: Color = (0.22, 0.18, 0.16)
@@ -314,11 +314,11 @@ class PersonShape:
         eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
         around = bounds([eye], 0.075 * scale)
         yield Garment("eyes", COLORS.eyes, placed(shape.eyes, frame), *around, 0.0040, rigid)
-        yield Garment("lids", COLORS.skin, placed(shape.lids, frame), *around, 0.0024, rigid)
+        yield Garment("front", COLORS.skin, placed(shape.front, frame), *bounds([eye], 0.12 * scale), 0.0026, rigid)
         yield Garment("irises", COLORS.irises, placed(shape.irises, frame), *around, 0.0025, rigid)
         yield Garment("brows", COLORS.hair, placed(shape.brows, frame), *around, 0.0022, rigid)
         mouth = bounds([eye - np.array([0.0, 0.0, 0.075]) * scale], 0.05 * scale)
-        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.0027, rigid)
+        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.0016, rigid)
 
     def _hand(self, side: str) -> Garment:
         shape, frame = hand_shape(self.person, side), self.bind[f"{side}_hand"]
