@@ -230,9 +230,9 @@ class PersonShape:
         """The muscle from the flank to below the shoulder, which a hanging arm hides and a raised one shows."""
         scale, sign = self._scale, dict(SIDES)[side]
         shoulder, flank = self.at(f"{side}_upper_arm"), 0.5 * self.person.size("chest_breadth")
-        high = shoulder + np.array([-0.004, -0.008 * sign, -0.012]) * scale
+        high = shoulder + np.array([-0.004, 0.012 * sign, -0.012]) * scale
         low = np.array([shoulder[0] - 0.004, sign * (flank - 0.052 * scale), shoulder[2] - 0.23 * scale])
-        body = grown(round_cone(low, high, 0.050 * scale, 0.90 * self.person.radius("upper_arm")), CLOTH)
+        body = grown(round_cone(low, high, 0.050 * scale, 0.85 * self.person.radius("upper_arm")), CLOTH)
         claims = [Claim("thorax", ball(low, 0.0), 0.03), Claim(f"{side}_clavicle", ball(high, 0.0), 0.03)]
         return Garment(f"{side}_latissimus", COLORS.shirt, body, *bounds([low, high], 0.08 * scale), 0.012, claims)
 
