@@ -55,6 +55,36 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
     return gap
 
 
+@compiled(inner=True)
+def balls_around(placement: Array, reach: Array, first: Indices, members: Indices, ball: Array) -> None:
+    """Write centre and radius of a ball around each body, whose pieces are ``members[first[c]:first[c + 1]]``."""
+    for c in range(len(first) - 1):
+        count = first[c + 1] - first[c]
+        for k in range(3):
+            total = 0.0
+            for m in range(first[c], first[c + 1]):
+                total += placement[members[m], 3, k]
+            ball[c, k] = total / count
+        radius = 0.0
+        for m in range(first[c], first[c + 1]):
+            i = members[m]
+            square = 0.0
+            for k in range(3):
+                square += (placement[i, 3, k] - ball[c, k]) ** 2
+            radius = max(radius, np.sqrt(square) + reach[i])
+        ball[c, 3] = radius
+
+
+@compiled(inner=True)
+def ball_gap(ball: Array, body: int, placement: Array, reach: Array, piece: int) -> float:
+    """A lower bound of the distances of all pieces of a body from another piece."""
+    square = 0.0
+    for k in range(3):
+        square += (placement[piece, 3, k] - ball[body, k]) ** 2
+    gap: float = np.sqrt(square) - ball[body, 3] - reach[piece]
+    return gap
+
+
 @compiled()
 def gather(
     results: Array, index: Indices, known: tuple[Indices, Array, Array], within: float, most: Array,
@@ -134,14 +164,16 @@ def renew(marked: Indices, before: int, index: Indices, count: int, changed: Ind
 
 @compiled()
 def look(
-    placement: Array, known: tuple[Indices, Array, Array, Array, Array, Array, Array, Indices], within: float,
-    most: Array, before: int,
+    placement: Array, known: tuple[Indices, Array, Array, Array, Array, Array, Array, Indices],
+    blocks: tuple[Indices, Indices, Indices, Indices, Indices, Array], within: float, most: Array, before: int,
+    whole: bool,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `marks[0]`.
 
     A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
     was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
-    between boxes along the world's axes about them. All three bound the distance in penetration too.
+    between boxes along the world's axes about them. All three bound the distance in penetration too. Before, a block
+    of pairs is left out where the gap between spheres about a body and about the other piece is not below that.
 
     Args:
         placement: (n, 4, 3) where the pieces are; see `Contacts.placements`.
@@ -150,19 +182,41 @@ def look(
             (2, pairs), a lower bound of the distance when a pair was last looked at, plus what both had travelled
             then, and the distance at and below which coal may have no normal; room (n, 3) for the sizes of the boxes;
             `marks` (3, pairs), room for the answer, the pairs of the last one, and those that differ, see `renew`.
+        blocks: those of the pair table; room (c + 1, 4) for balls around the bodies.
         within: metres.
         most: (pairs,) for one pair each, in place of `within` where it is less.
         before: how many the last answer had.
+        whole: whether the bounds of all pairs are wanted, so that no block is left out.
 
     Returns:
         How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
     pairs, reach, half, last, travelled, bound, extent, marks = known
+    begin, second, body, first, members, ball = blocks
     index = marks[0]
     travel(placement, last, reach, travelled)
     bound_by_boxes(placement, half, extent)
-    count = 0
-    for p in range(len(pairs)):
+    count, upto = 0, len(second)
+    if whole or upto == 0:
+        upto = 0
+        count = _look_at(placement, known, within, most, 0, len(pairs), 0)
+    else:
+        balls_around(placement, reach, first, members, ball)
+    for b in range(upto):
+        if not ball_gap(ball, body[b], placement, reach, second[b]) >= within:
+            count = _look_at(placement, known, within, most, begin[b], begin[b + 1], count)
+    gone, came = renew(marks[1], before, index, count, marks[2])
+    return count, gone, came
+
+
+@compiled(inner=True)
+def _look_at(
+    placement: Array, known: tuple[Indices, Array, Array, Array, Array, Array, Array, Indices], within: float,
+    most: Array, begin: int, end: int, count: int,
+) -> int:  # fmt: skip
+    """Look at the pairs from `begin` to `end`, after `count` that may be near; how many may be then."""
+    pairs, reach, _, _, travelled, bound, extent, marks = known
+    for p in range(begin, end):
         a, b = pairs[p, 0], pairs[p, 1]
         way = travelled[a] + travelled[b]
         near = min(within, most[p])
@@ -172,7 +226,6 @@ def look(
         if gap >= near:
             bound[0, p] = gap + way
             continue
-        index[count] = p
+        marks[0, count] = p
         count += 1
-    gone, came = renew(marks[1], before, index, count, marks[2])
-    return count, gone, came
+    return count
