@@ -11,8 +11,11 @@ from wholebody.geometry.pieces import COAL_ACCURACY
 
 
 @compiled(inner=True)
-def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> None:
-    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last` (n, 4, 3)."""
+def travel(placement: Array, last: Array, reach: Array, travelled: Array, half: Array, extent: Array) -> None:
+    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last` (n, 4, 3).
+
+    Boxes about those that turned are renewed too; see `bound_by_boxes`.
+    """
     # A point x moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm.
     for i in range(len(reach)):
         shift = 0.0
@@ -20,26 +23,35 @@ def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> Non
         for k in range(3):
             change = placement[i, 3, k] - last[i, 3, k]
             shift += change * change
-            last[i, 3, k] = placement[i, 3, k]
             for j in range(3):
                 change = placement[i, j, k] - last[i, j, k]
                 turn += change * change
-                last[i, j, k] = placement[i, j, k]
         if turn > 0.0:
             travelled[i] += np.sqrt(shift) + np.sqrt(turn) * reach[i]
+            bound_by_box(placement, half, extent, i)
         elif shift > 0.0:
             travelled[i] += np.sqrt(shift)
+        if turn + shift > 0.0:
+            for k in range(3):
+                for j in range(4):
+                    last[i, j, k] = placement[i, j, k]
+
+
+@compiled(inner=True)
+def bound_by_box(placement: Array, half: Array, extent: Array, i: int) -> None:
+    """Write half the size (n, 3) of a box along the world's axes about a box along a piece's own into `extent`."""
+    for k in range(3):
+        total = 0.0
+        for j in range(3):
+            total += abs(placement[i, j, k]) * half[i, j]
+        extent[i, k] = total
 
 
 @compiled(inner=True)
 def bound_by_boxes(placement: Array, half: Array, extent: Array) -> None:
-    """Write half the sizes (n, 3) of boxes along the world's axes about boxes along the pieces' own into `extent`."""
+    """The same of all pieces (n,)."""
     for i in range(len(half)):
-        for k in range(3):
-            total = 0.0
-            for j in range(3):
-                total += abs(placement[i, j, k]) * half[i, j]
-            extent[i, k] = total
+        bound_by_box(placement, half, extent, i)
 
 
 @compiled(inner=True)
@@ -180,7 +192,7 @@ def look(
         known: `pairs`, `reach` and `half` of the pair table; `last` (n, 4, 3), where the pieces were when this was
             asked last; `travelled` (n,), how far each can have moved since the beginning, see `travel`; `bound`
             (2, pairs), a lower bound of the distance when a pair was last looked at, plus what both had travelled
-            then, and the distance at and below which coal may have no normal; room (n, 3) for the sizes of the boxes;
+            then, and the distance at and below which coal may have no normal; sizes (n, 3) of the boxes there;
             `marks` (3, pairs), room for the answer, the pairs of the last one, and those that differ, see `renew`.
         blocks: those of the pair table; room (c + 1, 4) for balls around the bodies.
         within: metres.
@@ -194,8 +206,7 @@ def look(
     pairs, reach, half, last, travelled, bound, extent, marks = known
     begin, second, body, first, members, ball = blocks
     index = marks[0]
-    travel(placement, last, reach, travelled)
-    bound_by_boxes(placement, half, extent)
+    travel(placement, last, reach, travelled, half, extent)
     count, upto = 0, len(second)
     if whole or upto == 0:
         upto = 0
