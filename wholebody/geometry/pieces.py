@@ -61,13 +61,16 @@ def with_own_places(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
     return tuple(Piece(piece.geometry, pin.SE3(piece.placement), piece.volume) for piece in pieces)
 
 
+_ENDS = np.array(list(np.ndindex(2, 2, 2)))  # (8, 3) which of both sides the corners of a box are at, along each axis
+
+
 def box_corners(geometry: Any) -> Array:
     """Corners (8, 3) of the axis-aligned box around a coal shape in its own axes, metres; endless for a half-space."""
     # coal writes the box into the shape. A copy is used, because pickles of scenes would change otherwise.
     own = geometry.clone()
     own.computeLocalAABB()
     sides = np.array([own.aabb_local.min_, own.aabb_local.max_])
-    return np.array([[sides[x, 0], sides[y, 1], sides[z, 2]] for x, y, z in np.ndindex(2, 2, 2)])
+    return np.asarray(sides[_ENDS, (0, 1, 2)])
 
 
 class SweptPoints(NamedTuple):
@@ -135,7 +138,7 @@ def _of_boxes(geometries: Sequence[Any]) -> Iterator[SweptPoints]:
 
 
 _KNOWN: WeakKeyDictionary[Any, SweptPoints] = WeakKeyDictionary()
-"""Those of hulls that are in use: scenes of one study share the hulls of their things, and so does a scene built anew."""
+"""Those of hulls that are in use: scenes of one study share the hulls of things, and so does a scene built anew."""
 
 
 def _swept_hull(geometry: Any) -> SweptPoints:

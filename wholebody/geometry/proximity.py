@@ -29,7 +29,7 @@ SINGLY = 3000
 Pinocchio 1 ns for each of them, to be called 200 ns for each that is."""
 
 
-FEW = 8  # pairs of a block on average, below which to look at blocks takes longer than to look at all pairs
+FEW = 3  # pairs of a block on average, below which to look at blocks takes longer than to look at all pairs
 
 
 class Contacts(NamedTuple):
@@ -148,22 +148,30 @@ class PairTable:
 
 
 def pair_blocks(model: pin.Model, joint: Indices, pairs: Indices) -> tuple[Indices, Indices, Indices, Indices, Indices]:
-    """Blocks of pairs: a body, all pieces that come first and that one joint of the world carries, beside a piece.
+    """Blocks of pairs: a body, all pieces that come first and that one joint of the world carries, and one that stands.
 
     Returns:
-        Where the blocks begin, and the last ends (b + 1,); of each its second piece (b,) and its body (b,); where the
-        pieces of the bodies begin (c + 1,), and these (m,). They are none where blocks would have few pairs each.
+        Where the blocks begin, and the last ends (b + 1,); of each the piece that stands (b,), -1 for a block of pairs
+        of which none does, and its body (b,); where the pieces of the bodies begin (c + 1,), and these (m,). They are
+        none where blocks would have few pairs each.
     """
     root = np.array([supports[1] if len(supports) > 1 else 0 for supports in model.supports], dtype=np.intp)
-    body, last = root[joint[pairs[:, 0]]], pairs[:, 1]
+    first, second = pairs.T
+    stands = joint[second] == 0
+    roots, members = np.unique(root[joint[first[stands]]]), np.unique(first[stands])
+    last, body = np.where(stands, second, -1), np.where(stands, np.searchsorted(roots, root[joint[first]]), -1)
     begin = np.flatnonzero(np.concatenate([[True], (np.diff(body) != 0) | (np.diff(last) != 0)])[: len(pairs)])
     if len(pairs) < FEW * len(begin):
         begin = begin[:0]
-    members = np.unique(pairs[:, 0]) if len(begin) else begin
     members = members[np.argsort(root[joint[members]], kind="stable")]
-    roots, first = np.unique(root[joint[members]], return_index=True)
-    ends = [np.append(start, end).astype(np.intp) for start, end in ((begin, len(pairs)), (first, len(members)))]
-    return ends[0], last[begin], np.searchsorted(roots, body[begin]), ends[1], members
+    ends = np.append(begin, len(pairs)).astype(np.intp)
+    return (
+        ends,
+        last[begin],
+        body[begin],
+        np.append(np.searchsorted(root[joint[members]], roots), len(members)),
+        members,
+    )
 
 
 def _joined(parts: list[Array]) -> tuple[Array, Indices]:
@@ -253,9 +261,7 @@ class Proximity:
         self._kernel.bound_from_below(self.results_of(index), index, self.known, found)
         return found
 
-    def ask(
-        self, data: Any, within: float, most: Array | None = None, *, whole: bool = False
-    ) -> tuple[Indices, Array]:
+    def ask(self, data: Any, within: float, most: Array | None = None, *, whole: bool = False) -> tuple[Indices, Array]:
         """Have coal compute the pairs of `query`: numbers (k,) and placements, until the next; see `results_of`.
 
         With `whole` all pairs get bounds, also those that are told to be far by the bodies that they are of.

@@ -203,7 +203,7 @@ def look(
     Returns:
         How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
-    pairs, reach, half, last, travelled, bound, extent, marks = known
+    pairs, reach, half, last, travelled, _, extent, marks = known
     begin, second, body, first, members, ball = blocks
     index = marks[0]
     travel(placement, last, reach, travelled, half, extent)
@@ -214,7 +214,7 @@ def look(
     else:
         balls_around(placement, reach, first, members, ball)
     for b in range(upto):
-        if not ball_gap(ball, body[b], placement, reach, second[b]) >= within:
+        if second[b] < 0 or not ball_gap(ball, body[b], placement, reach, second[b]) >= within:
             count = _look_at(placement, known, within, most, begin[b], begin[b + 1], count)
     gone, came = renew(marks[1], before, index, count, marks[2])
     return count, gone, came

@@ -48,9 +48,12 @@ def far_moved(
     kept = 0
     for b in range(len(second)):
         one, other = body[b], second[b]
-        room = max(ball_gap(ball[0], one, before, reach, other), 0.0)
-        room += max(ball_gap(ball[1], one, after, reach, other), 0.0)
-        if not fastest[one] + motion[other] <= room:
+        far = False
+        if other >= 0:
+            room = max(ball_gap(ball[0], one, before, reach, other), 0.0)
+            room += max(ball_gap(ball[1], one, after, reach, other), 0.0)
+            far = fastest[one] + motion[other] <= room
+        if not far:
             kept = _far_moved(before, after, table, near, motion, (begin[b], begin[b + 1], kept), found)
     return found[:kept]
 
@@ -92,7 +95,7 @@ def _apart(number: Indices, distance: Array, within: float, pair: int) -> float:
     """How far a pair is apart: by its distance if it is near, else by the query distance."""
     for c in range(len(number)):
         if number[c] == pair:
-            return max(distance[c], 0.0)
+            return float(max(distance[c], 0.0))
     return max(within, 0.0)
 
 
