@@ -113,13 +113,13 @@ def frames_passed_through(
             )
             is not None
         )
-    sweep, motions = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
+    sweep, motions = Sweep(scene.model, scene.geometry, scene.pair_table), enumerate(pairwise(q), start=1)
     return tuple(frame for frame, motion in motions if sweep.first_contact(*motion, tolerance=depth) is not None)
 
 
 def deepened(scene: Scene, q: Array) -> Array:
     """(n - 1,) least of `DEPTHS` [m] that no pair deepens by between two postures (n, nq), swept from either end."""
-    sweep, found = Sweep(scene.model, scene.geometry), []
+    sweep, found = Sweep(scene.model, scene.geometry, scene.pair_table), []
     for way in pairwise(q):
         free = (
             depth

@@ -10,7 +10,6 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array, with_values
@@ -26,7 +25,7 @@ from wholebody.geometry.components import (
 )
 from wholebody.geometry.hull import check_points, hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
-from wholebody.geometry.pieces import SMALLEST, Piece
+from wholebody.geometry.pieces import SMALLEST, Piece, with_own_places
 
 if TYPE_CHECKING:
     from wholebody.base.runner import Child
@@ -68,9 +67,7 @@ def convex_pieces(
     cloud, triangles = check_mesh(vertices, faces, what)
     settings = int(VERTICES(max_vertices, f"{what}: max_vertices")), CONCAVITY(threshold, f"{what}: threshold")
     found = _decomposed(cloud.tobytes(), triangles.tobytes(), *settings, what)
-    return with_values(
-        found, pieces=tuple(with_values(piece, placement=pin.SE3(piece.placement)) for piece in found.pieces)
-    )
+    return with_values(found, pieces=with_own_places(found.pieces))
 
 
 def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from itertools import combinations, pairwise
+from operator import add, mul, sub
 from typing import Any
 
 import coal
@@ -75,7 +76,7 @@ def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
     vertices = coal.StdVec_Vec3s()
     vertices.extend(list(corners))
     triangles = coal.StdVec_Triangle()
-    triangles.extend([coal.Triangle(*map(int, face)) for face in faces])
+    triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
     return coal.Convex(vertices, triangles)
 
 
@@ -143,21 +144,50 @@ def enclosing_ball(points: Array) -> tuple[Array, float]:
 
 
 def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple[list[int], Array, float]:
-    """Of all balls through one to four of at most five points, the smallest that contains the five."""
-    best: tuple[list[int], Array, float] | None = None
-    for size in range(1, min(4, len(candidates)) + 1):
-        for chosen in combinations(candidates, size):
-            corners = points[list(chosen)]
-            edges = corners[1:] - corners[0]
-            offset = np.linalg.lstsq(2 * edges, (edges**2).sum(axis=1), rcond=None)[0] if size > 1 else np.zeros(3)
-            centre, radius = corners[0] + offset, float(np.linalg.norm(offset))
-            inside = np.linalg.norm(points[candidates] - centre, axis=1).max() <= radius + 1e-10 * scale
-            if inside and (best is None or radius < best[2]):
-                best = (list(chosen), centre, radius)
-    if best is None:  # rounding among nearly concyclic points: use any ball that contains them
-        centre = points[candidates].mean(axis=0)
-        best = (candidates[-4:], centre, float(np.linalg.norm(points[candidates] - centre, axis=1).max()))
-    return best
+    """Of all balls through the last of two to five points and one to three others, the smallest that contains all."""
+    best: tuple[float, list[int], tuple[float, ...]] | None = None
+    places = dict(zip(candidates, map(tuple, points[candidates].tolist()), strict=True))
+    *others, last = candidates
+    for size in range(1, min(3, len(others)) + 1):
+        for chosen in combinations(others, size):
+            offset = _to_centre([tuple(map(sub, places[k], places[last])) for k in chosen])
+            if offset is None:
+                continue
+            centre, radius = tuple(map(add, places[last], offset)), math.hypot(*offset)
+            if best is None or radius < best[0]:
+                inside = max(math.dist(place, centre) for place in places.values()) <= radius + 1e-10 * scale
+                best = (radius, [*chosen, last], centre) if inside else best
+    if best is not None:
+        return best[1], np.array(best[2]), best[0]
+    # rounding among nearly concyclic points: use any ball that contains them
+    middle = points[candidates].mean(axis=0)
+    return candidates[-4:], middle, float(np.linalg.norm(points[candidates] - middle, axis=1).max())
+
+
+def _to_centre(edges: list[tuple[float, ...]]) -> tuple[float, ...] | None:
+    """From a point to the centre of the smallest ball through it and one to three others, by the edges to these.
+
+    None where the edges are dependent: a ball through fewer of the points is the same or smaller then.
+    """
+    squares = [sum(map(mul, edge, edge)) for edge in edges]
+    if len(edges) == 1:
+        return tuple(0.5 * x for x in edges[0])
+    normal = _crossed(edges[0], edges[1])
+    if len(edges) == 2:
+        most, size = squares[0] * squares[1], sum(map(mul, normal, normal))
+        if size <= 1e-24 * most:
+            return None
+        outward = tuple(squares[0] * y - squares[1] * x for x, y in zip(*edges, strict=True))
+        return tuple(0.5 * x / size for x in _crossed(outward, normal))
+    volume = sum(map(mul, normal, edges[2]))
+    if abs(volume) <= 1e-12 * math.sqrt(squares[0] * squares[1] * squares[2]):
+        return None
+    sides = _crossed(edges[1], edges[2]), _crossed(edges[2], edges[0]), normal
+    return tuple(0.5 * sum(map(mul, squares, parts)) / volume for parts in zip(*sides, strict=True))
+
+
+def _crossed(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, ...]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:

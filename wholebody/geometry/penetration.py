@@ -104,12 +104,13 @@ def object_penetrations(
     keys = np.array([first[a] * len(owners) + first[b] for a, b in touching], dtype=np.intp)
     for i, j in ordered[np.isin(number[ordered[:, 0]] * len(owners) + number[ordered[:, 1]], keys)].tolist():
         touching[owners[i], owners[j]].append((i, j))
+    pieces_of: dict[str, list[int]] = {}
+    for k, owner in enumerate(owners):
+        pieces_of.setdefault(owner, []).append(k)
     found = []
     for (a, b), pairs_of_both in touching.items():
         if not pairs_of_both:  # all of two owners where the geometry has none
-            pairs_of_both = [
-                (i, j) for i, one in enumerate(owners) if one == a for j, two in enumerate(owners) if two == b
-            ]
+            pairs_of_both = [(i, j) for i in pieces_of[a] for j in pieces_of[b]]
         allowed = np.array(pairs_of_both)
         (of_a, row), (of_b, column) = (np.unique(allowed[:, side], return_inverse=True) for side in range(2))
         mask = np.zeros((len(of_a), len(of_b)), dtype=bool)

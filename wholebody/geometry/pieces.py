@@ -9,9 +9,9 @@ which parts of a piece can touch next when the posture changes; one witness poin
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, TypeVar
+from weakref import WeakKeyDictionary
 
 import coal
 import numpy as np
@@ -41,13 +41,36 @@ class Piece(NamedTuple):
     volume: float  # cubic metres; infinite for a half-space
 
 
+_T = TypeVar("_T")
+_MADE: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
+
+
+def kept(shape: Any, make: Callable[[], _T]) -> _T:
+    """What a shape is made into, made the first time and kept with it: scenes are built anew when a thing comes.
+
+    It is for shapes that equal themselves alone.
+    """
+    found: _T | None = _MADE.get(shape)
+    if found is None:
+        found = _MADE[shape] = make()
+    return found
+
+
+def with_own_places(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
+    """The same pieces at placements that the caller may change."""
+    return tuple(Piece(piece.geometry, pin.SE3(piece.placement), piece.volume) for piece in pieces)
+
+
+_ENDS = np.array(list(np.ndindex(2, 2, 2)))  # (8, 3) which of both sides the corners of a box are at, along each axis
+
+
 def box_corners(geometry: Any) -> Array:
     """Corners (8, 3) of the axis-aligned box around a coal shape in its own axes, metres; endless for a half-space."""
     # coal writes the box into the shape. A copy is used, because pickles of scenes would change otherwise.
     own = geometry.clone()
     own.computeLocalAABB()
     sides = np.array([own.aabb_local.min_, own.aabb_local.max_])
-    return np.array([[sides[x, 0], sides[y, 1], sides[z, 2]] for x, y, z in np.ndindex(2, 2, 2)])
+    return np.asarray(sides[_ENDS, (0, 1, 2)])
 
 
 class SweptPoints(NamedTuple):
@@ -114,8 +137,18 @@ def _of_boxes(geometries: Sequence[Any]) -> Iterator[SweptPoints]:
         yield SweptPoints(own, 0.0, sides, math.hypot(*lengths), _NO_AXIS, 2.0 * min(lengths), box)
 
 
-@lru_cache(maxsize=64)  # scenes of one study share the hulls of their things; more would hold those of scenes gone
+_KNOWN: WeakKeyDictionary[Any, SweptPoints] = WeakKeyDictionary()
+"""Those of hulls that are in use: scenes of one study share the hulls of things, and so does a scene built anew."""
+
+
 def _swept_hull(geometry: Any) -> SweptPoints:
+    known = _KNOWN.get(geometry)
+    if known is None:
+        known = _KNOWN[geometry] = _points_of_hull(geometry)
+    return known
+
+
+def _points_of_hull(geometry: Any) -> SweptPoints:
     points = np.array(geometry.points())
     faces = _convex_faces(geometry, points)
     width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
@@ -151,5 +184,7 @@ def _convex_faces(geometry: Any, points: Array) -> Array:
     normals[inward] *= -1.0
     offsets[inward] *= -1.0
     planes = np.column_stack([normals, offsets])
-    _, first = np.unique(np.round(planes, 7), axis=0, return_index=True)
-    return planes[np.sort(first)]
+    first: dict[tuple[float, ...], int] = {}
+    for row, plane in enumerate(np.round(planes, 7).tolist()):
+        first.setdefault(tuple(plane), row)
+    return planes[list(first.values())]

@@ -29,6 +29,9 @@ SINGLY = 3000
 Pinocchio 1 ns for each of them, to be called 200 ns for each that is."""
 
 
+FEW = 3  # pairs of a block on average, below which to look at blocks takes longer than to look at all pairs
+
+
 class Contacts(NamedTuple):
     """Pairs nearer than a query distance. All arrays have k rows, and no gaps in memory.
 
@@ -112,6 +115,7 @@ class PairTable:
         faces: (f, 4) outward planes of all pieces, see `SweptPoints.faces`.
         first_face: (n + 1,) where those of each piece begin.
         points_meet: (pairs,) distance at and below which coal's normal means nothing, metres; -inf for most pairs.
+        blocks: pairs in a row of one second piece with first pieces of one body; see `pair_blocks`.
     """
 
     def __init__(
@@ -140,6 +144,34 @@ class PairTable:
         # where round pieces' swept points meet, coal's normal is zero or noise along an axis
         one, other = radius[first], radius[second]
         self.points_meet = np.where((one > 0.0) & (other > 0.0), COAL_ACCURACY - (one + other), -np.inf)
+        self.blocks = pair_blocks(model, self.joint, self.pairs)
+
+
+def pair_blocks(model: pin.Model, joint: Indices, pairs: Indices) -> tuple[Indices, Indices, Indices, Indices, Indices]:
+    """Blocks of pairs: a body, all pieces that come first and that one joint of the world carries, and one that stands.
+
+    Returns:
+        Where the blocks begin, and the last ends (b + 1,); of each the piece that stands (b,), -1 for a block of pairs
+        of which none does, and its body (b,); where the pieces of the bodies begin (c + 1,), and these (m,). They are
+        none where blocks would have few pairs each.
+    """
+    root = np.array([supports[1] if len(supports) > 1 else 0 for supports in model.supports], dtype=np.intp)
+    first, second = pairs.T
+    stands = joint[second] == 0
+    roots, members = np.unique(root[joint[first[stands]]]), np.unique(first[stands])
+    last, body = np.where(stands, second, -1), np.where(stands, np.searchsorted(roots, root[joint[first]]), -1)
+    begin = np.flatnonzero(np.concatenate([[True], (np.diff(body) != 0) | (np.diff(last) != 0)])[: len(pairs)])
+    if len(pairs) < FEW * len(begin):
+        begin = begin[:0]
+    members = members[np.argsort(root[joint[members]], kind="stable")]
+    ends = np.append(begin, len(pairs)).astype(np.intp)
+    return (
+        ends,
+        last[begin],
+        body[begin],
+        np.append(np.searchsorted(root[joint[members]], roots), len(members)),
+        members,
+    )
 
 
 def _joined(parts: list[Array]) -> tuple[Array, Indices]:
@@ -180,6 +212,7 @@ class Proximity:
             table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
             np.zeros((count, 3)), marks,
         )  # fmt: skip
+        self._blocks = *table.blocks, np.zeros((len(table.blocks[3]), 4))
         self.known = table.pairs, self._travelled, self._bound
         # memory that is never written takes none
         self._read = None if self.distances.kept else np.zeros((pairs, RESULT_DOUBLES))
@@ -223,18 +256,21 @@ class Proximity:
 
     def least(self, data: Any, within: float) -> Array:
         """Distances (pairs,) of pairs that may be nearer than `within` metres, and bounds from below of all others."""
-        index, _ = self.ask(data, within)
+        index, _ = self.ask(data, within, whole=True)
         found = np.empty(len(self.table.pairs))
         self._kernel.bound_from_below(self.results_of(index), index, self.known, found)
         return found
 
-    def ask(self, data: Any, within: float, most: Array | None = None) -> tuple[Indices, Array]:
-        """Have coal compute the pairs of `query`: numbers (k,) and placements, until the next; see `results_of`."""
+    def ask(self, data: Any, within: float, most: Array | None = None, *, whole: bool = False) -> tuple[Indices, Array]:
+        """Have coal compute the pairs of `query`: numbers (k,) and placements, until the next; see `results_of`.
+
+        With `whole` all pairs get bounds, also those that are told to be far by the bodies that they are of.
+        """
         began = time.perf_counter()
         distances, results, placed = self.distances, self.results, self.place(data)
         try:
             count, gone, came = self._kernel.look(
-                placed, self._looked, within, self._endless if most is None else most, self._count
+                placed, self._looked, self._blocks, within, self._endless if most is None else most, self._count, whole
             )
             self._count = count
             self.asked += count
@@ -301,7 +337,8 @@ def compiled_kernel(proximity_kernel: Any) -> None:
     index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     lines, bound, marks = np.zeros((1, 3)), np.zeros((2, 0)), np.zeros((3, 0), dtype=np.intp)
     known = pairs, one, lines, placement.copy(), one.copy(), bound, lines, marks
-    proximity_kernel.look(placement, known, 0.0, none, 0)
+    blocks = index, index, index, index, index, np.zeros((0, 4))
+    proximity_kernel.look(placement, known, blocks, 0.0, none, 0, False)
     room = none, np.zeros((3, 0, 3)), index, pairs
     results = np.zeros((0, RESULT_DOUBLES))
     proximity_kernel.gather(results, index, (pairs, one, bound), 0.0, none, room)

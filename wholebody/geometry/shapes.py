@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.base.arrays import Array, brief
+from wholebody.base.arrays import Array, brief, with_values
 from wholebody.base.checks import array, listed, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
@@ -21,7 +21,7 @@ from wholebody.geometry.convex import CONCAVITY, VERTICES, check_mesh, convex_pi
 from wholebody.geometry.hull import SIDES, check_points, cylinder_pieces, hull_piece, torus_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
-from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece, kept, with_own_places
 from wholebody.geometry.placement import unit_vector
 
 LENGTH = Range(SMALLEST, LARGEST, "m")
@@ -248,13 +248,13 @@ class Hull(Shape):
 
     def __post_init__(self) -> None:
         points = np.unique(check_points(array(self.points, "Hull: points", "an array of shape (n, 3)"), "Hull"), axis=0)
-        hull_piece(points, "Hull")
         points.setflags(write=False)
         object.__setattr__(self, "points", points)
+        self.pieces()
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
-        return (hull_piece(self.points, "Hull"),)
+        return with_own_places(kept(self, lambda: (hull_piece(self.points, "Hull"),)))
 
 
 @runtime_checkable
@@ -339,7 +339,9 @@ class Mesh(Shape):
 
     def convexified(self) -> ConvexPieces:
         """Pieces, added volume, and notes on the parts that could not be kept as they are."""
-        return convex_pieces(self.vertices, self.faces, self.max_vertices, self.threshold, self._name())
+        settings = self.max_vertices, self.threshold, self._name()
+        found = kept(self, lambda: convex_pieces(self.vertices, self.faces, *settings))
+        return with_values(found, pieces=with_own_places(found.pieces))
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex for each convex part, several for the others.

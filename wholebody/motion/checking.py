@@ -15,7 +15,6 @@ from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import function, instance, known, number
 from wholebody.figures.state import root_freedoms
 from wholebody.geometry.continuous.swept_depth import SweptDepth
-from wholebody.geometry.proximity import PairTable
 from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
 from wholebody.motion.stance import Sliding, sliding
@@ -225,7 +224,7 @@ def check(
         if clip.things:  # the things that move get joints
             moving = MovingScene(scene.built, clip.things, between_things=False)
             moving.refresh(workspace.geometry)
-            swept = SweptDepth(PairTable(moving.model, moving.geometry), moving.geometry, depth)
+            swept = SweptDepth(moving.table, moving.geometry, depth)
             tracks = [[pin.XYZQUATToSE3(one) for one in track] for track in clip.things.values()]
             q = np.array(
                 [

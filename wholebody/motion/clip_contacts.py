@@ -55,26 +55,24 @@ class ContactTable:
     """Depths of all pairs of owners, filled frame by frame."""
 
     def __init__(self, scene: Scene, frames: int) -> None:
-        owners, numbers = scene.piece_owner, dict[tuple[str, str], int]()
-        pairs = scene.pair_table.pairs
-        named = [(owners[a], owners[b]) for a, b in pairs.tolist()]
-        self._of = np.array([numbers.setdefault(pair, len(numbers)) for pair in named], dtype=np.intp)
-        self._names, self._scene, self._frames = list(numbers), scene, frames
-        self._found: dict[int, tuple[Array, Array]] = {}
+        self._owners, self._pairs = scene.piece_owner, scene.pair_table.pairs
+        self._scene, self._frames = scene, frames
+        self._found: dict[tuple[str, str], tuple[Array, Array]] = {}
 
     def add(self, place: int, depths: Depths, *, between: bool) -> None:
         """Enter the overlaps of a frame, or of the gap after it."""
-        for number, depth in zip(self._of[depths.number].tolist(), depths.depth.tolist(), strict=True):
-            if number not in self._found:
-                self._found[number] = np.zeros(self._frames), np.zeros(max(0, self._frames - 1))
-            row = self._found[number][int(between)]
+        for pair, depth in zip(self._pairs[depths.number].tolist(), depths.depth.tolist(), strict=True):
+            names = self._owners[pair[0]], self._owners[pair[1]]
+            if names not in self._found:
+                self._found[names] = np.zeros(self._frames), np.zeros(max(0, self._frames - 1))
+            row = self._found[names][int(between)]
             row[place] = max(row[place], depth)
 
     def contacts(self, tolerance: float) -> tuple[Contact, ...]:
         """The pairs that overlap by more than the tolerance, the deepest first."""
         found = [
-            contact(*self._names[number], self._kind(*self._names[number]), depth, between, tolerance)
-            for number, (depth, between) in self._found.items()
+            contact(*names, self._kind(*names), depth, between, tolerance)
+            for names, (depth, between) in self._found.items()
             if max(depth.max(), between.max(initial=0.0)) > tolerance
         ]
         return tuple(sorted(found, key=lambda contact: -contact.deepest))

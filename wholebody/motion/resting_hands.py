@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Names
 from wholebody.figures.figure import Figure
 from wholebody.motion.footholds import RestLimits, slow
@@ -97,18 +97,25 @@ def resting_hands(scene: Scene, q: Array, dt: float, hands: Sequence[str]) -> tu
     ids = {name: scene.frame_id(name) for name in hands}
     ids |= {thing.segment: scene.frame_id(thing.segment) for thing in scene.objects.values() if thing.segment}
     at: dict[str, list[pin.SE3]] = {name: [] for name in ids}
+    joints = {hand: sorted(_after(scene.figure, _joint(scene, hand))) for hand in hands}
+    spans = {hand: np.array([[np.inf] * 3, [-np.inf] * 3]) for hand in hands}  # of the origins of its joints
     for posture in q if hands else ():
         pin.framesForwardKinematics(model, data, posture)
         for name, number in ids.items():
             at[name].append(data.oMf[number].copy())
+        for hand, span in spans.items():
+            origins = np.array([data.oMi[joint].translation for joint in joints[hand]])
+            span[:] = np.minimum(span[0], origins.min(axis=0)), np.maximum(span[1], origins.max(axis=0))
     for hand in hands:
         own, free = _pieces(scene, _joint(scene, hand)), np.ones(len(q), dtype=bool)
-        for place in _places(scene, hand, hands):
-            bases = [pin.SE3.Identity()] * len(q) if place.base is None else at[place.base]
-            there = [base.actInv(here) for base, here in zip(bases, at[hand], strict=True)]
-            still = free & slow(np.array([one.translation for one in there]), dt, limits)
+        slow_in: dict[str | None, Mask] = {}
+        for place in _places(scene, hand, hands, spans[hand]) if len(q) else ():
+            if place.base not in slow_in:
+                bases = [pin.SE3.Identity()] * len(q) if place.base is None else at[place.base]
+                there = [base.actInv(here) for base, here in zip(bases, at[hand], strict=True)]
+                slow_in[place.base] = slow(np.array([one.translation for one in there]), dt, limits)
             gaps = np.full(len(q), np.inf)
-            for frame in np.flatnonzero(still).tolist():
+            for frame in np.flatnonzero(free & slow_in[place.base]).tolist():
                 gaps[frame] = 0.0 if place.told else _gap(scene, data, q[frame], own, place)
             least = max(1, round(limits.least / dt))
             rests = long_runs((gaps <= place.most) & (gaps >= -INSIDE), least)
@@ -139,8 +146,11 @@ def _pieces(scene: Scene, joint: int) -> list[int]:
     return [index for index, owner in owners if owner not in things and pieces[index].parentJoint in after]
 
 
-def _places(scene: Scene, hand: str, hands: Sequence[str]) -> Iterator[_Place]:
-    """What a hand may rest on, what carries it first: carried things, other hands after it in the list, and things."""
+def _places(scene: Scene, hand: str, hands: Sequence[str], span: Array) -> Iterator[_Place]:
+    """What a hand may rest on, what carries it first: carried things, other hands after it in the list, and things.
+
+    Its joints stay within a box `span` (2, 3).
+    """
     figure, own = scene.figure, _after(scene.figure, _joint(scene, hand))
     others = [_after(figure, _joint(scene, name)) for name in hands if name != hand]
     joints = {name: _joint(scene, name) for name in figure.segments}
@@ -153,8 +163,23 @@ def _places(scene: Scene, hand: str, hands: Sequence[str]) -> Iterator[_Place]:
     for other in hands[hands.index(hand) + 1 :]:
         if (joint := _joint(scene, other)) not in own:
             yield _Place(other, other, NEAR, False, _pieces(scene, joint))
-    for name in still_things(scene):
+    for name in _beside(scene, _pieces(scene, _joint(scene, hand)), span):
         yield _Place(name, None, NEAR, False, [index for index, _ in scene.built.pieces_of[name]])
+
+
+def _beside(scene: Scene, own: Sequence[int], span: Array) -> list[str]:
+    """Things that stand no farther than `NEAR` from where pieces may be whose joints stay within a box (2, 3)."""
+    pieces, reach = scene.geometry.geometryObjects, scene.pair_table.reach
+    out = max((float(np.linalg.norm(pieces[k].placement.translation)) + reach[k] for k in own), default=0.0)
+    names = still_things(scene)
+    places = [(name, index) for name in names for index, _ in scene.built.pieces_of[name]]
+    index = np.array([index for _, index in places], dtype=np.intp)
+    with scene.borrow() as workspace:
+        centres = workspace.placements(scene.figure.neutral)[index, 3]
+    away = np.maximum(np.maximum(span[0] - centres, centres - span[1]), 0.0)
+    near = np.linalg.norm(away, axis=1) <= out + reach[index] + 2.0 * NEAR
+    found = {name for (name, _), is_near in zip(places, near.tolist(), strict=True) if is_near}
+    return [name for name in names if name in found]
 
 
 def _gap(scene: Scene, data: pin.Data, q: Array, own: Sequence[int], place: _Place) -> float:

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
-from wholebody.geometry.continuous.motion_bounds import largest_approach
+from wholebody.geometry.continuous.motion_bounds import largest_approach, pair_kinds
 from wholebody.geometry.continuous.moved_pairs import kept_apart
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.method import QP
@@ -69,24 +69,25 @@ class Geodesics:
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
-        # of every pair by every freedom
-        self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv)))
+        # of every kind of pairs by every freedom
+        pairs, self._kind = pair_kinds(workspace.table)
+        self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv), pairs))
         state, terms = workspace.state.update(problem.start), problem.constraints
         self._values = ConstraintValues(terms, state)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._sides = np.hstack([np.zeros((2, 0)), *sides]) + INSIDE * np.array([[1.0], [-1.0]])
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
         if len(unbounded):
-            names = [workspace.owners[piece] for piece in workspace.table.pairs[unbounded[0]]]
+            names = [workspace.owners[piece] for piece in pairs[unbounded[0]]]
             raise InputError(
                 f"plan: how much a motion brings {names[0]} and {names[1]} together has no bound; attach a box in "
                 "place of a half-space, and give limits to what slides"
             )
         # a radius that is larger by a metre makes way as what turns does
-        wider = np.asarray(largest_approach(workspace.table, centres + 1.0, np.eye(self._model.nv)))
+        wider = np.asarray(largest_approach(workspace.table, centres + 1.0, np.eye(self._model.nv), pairs))
         self._turning = np.where(wider - self._approach > 1e-9, wider - self._approach, 0.0)
         self._bending = np.where(self._turning > 0.0, 1.0, 2.0) * self._approach
-        joints, supports = workspace.table.joint[workspace.table.pairs], [set(s) for s in self._model.supports]
+        joints, supports = workspace.table.joint[pairs], [set(s) for s in self._model.supports]
         carried = [(a in supports[b], b in supports[a]) for a, b in joints.tolist()]
         # as a piece sees another one that it does not carry, twice as much
         self._views = np.where(np.array(carried).reshape(-1, 2), 0.25, 0.5)
@@ -176,7 +177,7 @@ class Geodesics:
             return False
         most, least = np.abs(motion), self._required - MARGIN
         bent = self._views * ((self._turning @ most) * (self._bending @ most))[:, None]
-        asked = [(q, motion, seen, ahead, self._approach @ most, bent)]
+        asked = [(q, motion, seen, ahead, (self._approach @ most)[self._kind], bent[self._kind])]
         for here, whole, first, last, far, bent in asked:  # grows while it is read
             room = first.room + last.room + 2.0 * MARGIN
             if kept_apart(self._workspace.table, first.placed, last.placed, (room, far, bent, least)):

@@ -369,7 +369,7 @@ class _Judge:
             f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
         ]
         if not any(faults):
-            sweep = Sweep(scene.model, scene.geometry)
+            sweep = Sweep(scene.model, scene.geometry, scene.pair_table)
             free = (not BUDGET.over and sweep.first_contact(*pair, tolerance=PASSED) is None for pair in pairwise(q))
             passed = next((k for k, kept in enumerate(free, 1) if not kept), 0)
             faults.append(f"something is passed through before frame {passed}" if passed else "")

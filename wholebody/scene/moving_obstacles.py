@@ -9,13 +9,12 @@ moves. The figure goes from posture to posture of its path meanwhile.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.passing_through import OVERLAP, entered
@@ -42,6 +41,7 @@ class MovingScene:
         figure_nq: numbers of the figure in a configuration; they come first.
         centres: thing to its centre (3,) in its own frame, metres.
         joints: thing to the joint that carries it.
+        table: pieces and pairs as arrays.
     """
 
     def __init__(self, built: SceneGeometry, names: Iterable[str], *, between_things: bool = True) -> None:
@@ -58,8 +58,12 @@ class MovingScene:
         self.centres = {name: self._centre(name) for name in self.names}
         self.joints = {name: self._add_joints(name) for name in self.names}
         self._still = [k for name, pieces in built.pieces_of.items() if name not in self.joints for k, _ in pieces]
+        pairs = built.table.pairs
         if between_things:
-            self._add_pairs()
+            between = self._pairs_of_things()
+            add_pairs(self.geometry, between)
+            pairs = np.concatenate([pairs, between])
+        self.table = PairTable(self.model, self.geometry, pairs, built.table.swept)
 
     def refresh(self, geometry: pin.GeometryModel | None = None) -> None:
         """Put the things that stay to where a geometry model has them, by default the scene's."""
@@ -105,17 +109,19 @@ class MovingScene:
             piece.parentJoint, piece.placement = about, to_centre * local
         return int(about)
 
-    def _add_pairs(self) -> None:
+    def _pairs_of_things(self) -> Indices:
+        """Pairs (k, 2) of two things in the world of which one moves."""
         pieces_of, pieces = self.built.pieces_of, self.built.geometry.geometryObjects
         in_world = [name for name, own in pieces_of.items() if pieces[own[0][0]].parentJoint == 0]
+        moving = [number for number, name in enumerate(in_world) if name in self.joints]
+        both = {(min(one, other), max(one, other)) for one in moving for other in range(len(in_world)) if one != other}
         pairs = [
             sorted((i, j))
-            for first, second in combinations(in_world, 2)
-            if first in self.joints or second in self.joints
-            for i, _ in pieces_of[first]
-            for j, _ in pieces_of[second]
+            for first, second in sorted(both)
+            for i, _ in pieces_of[in_world[first]]
+            for j, _ in pieces_of[in_world[second]]
         ]
-        add_pairs(self.geometry, np.array(pairs, dtype=np.intp).reshape(-1, 2))
+        return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
 LEAST_APPROACH, LARGEST_APPROACH = 5e-4, 0.02  # m: the same at least, and at most: rows are of first order only
@@ -217,8 +223,8 @@ class BothSides:
 
     def __init__(self, scene: MovingScene) -> None:
         self.scene = scene
-        self.table = PairTable(scene.model, scene.geometry)
-        self.sweep = Sweep(scene.model, scene.geometry)
+        self.table = scene.table
+        self.sweep = Sweep(scene.model, scene.geometry, self.table)
         self.depths = SweptDepth(self.table, scene.geometry, OVERLAP)
         self.rest = pin.neutral(scene.built.model)
         owners = np.array([owner in scene.joints for owner in scene.owners], dtype=bool)

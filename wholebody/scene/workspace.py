@@ -14,7 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.pool import Loan
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
-from wholebody.geometry.continuous.motion_bounds import largest_approach
+from wholebody.geometry.continuous.motion_bounds import largest_approach, pair_kinds
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.geometry_model import SceneGeometry
@@ -140,7 +140,7 @@ class Workspace(NotCopyable):
         if self._sweep is None:
             from wholebody.geometry.continuous.sweep import Sweep
 
-            self._sweep = Sweep(self.model, self.geometry)
+            self._sweep = Sweep(self.model, self.geometry, self.table)
         return self._sweep
 
     def depths(self, tolerance: float) -> SweptDepth:
@@ -167,7 +167,8 @@ class Workspace(NotCopyable):
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in self.geometry.geometryObjects])
         for pieces in self._built.pieces_of.values():
             centres[[index for index, _ in pieces]] = np.inf
-        return largest_approach(self.table, centres, most)
+        pairs, kind = pair_kinds(self.table)
+        return np.asarray(largest_approach(self.table, centres, most, pairs)[kind])
 
     def placements(self, q: Array) -> Array:
         """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""

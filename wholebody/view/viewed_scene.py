@@ -99,7 +99,8 @@ class ViewedWorld:
         self.model, self.geometry = self._moving.model, self._moving.geometry
         self.piece_owner = self._moving.owners
         self.configuration = self._moving.configuration
-        self._workspace = Workspace(SceneGeometry(self.model, self.geometry, tuple(self.piece_owner), {}))
+        owners, table = tuple(self.piece_owner), self._moving.table
+        self._workspace = Workspace(SceneGeometry(self.model, self.geometry, owners, {}, table.pairs, table.swept))
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Pairs nearer than `within` metres in a configuration (nq,), nearest first."""

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import PairTable
 
@@ -52,6 +52,11 @@ class MotionBounds:
         self._slide: Array = np.zeros(model.njoints)
         self.speed: Array = np.zeros((len(joint), model.njoints))
         self._finite = np.isfinite(reach)
+        self._carried = np.flatnonzero(joint > 0)  # what the world carries never moves
+        self._row = np.full(len(joint), len(self._carried), dtype=np.intp)  # where a piece is among these
+        self._row[self._carried] = np.arange(len(self._carried))
+        self._others = (~self.carries.T).astype(float)
+        self._against: Array = np.zeros((len(self._carried) + 1, model.njoints))
         self._size = np.where(self._finite, reach, 0.0)
         # one column a degree of freedom, in the order of the joints: a table over all pairs of them would be large
         joints = list(model.joints)[1:]
@@ -67,17 +72,19 @@ class MotionBounds:
             twists = np.add.reduceat(self._twists * velocity[self._column], self._first, axis=1)
             self._slide[1:], self.turn[1:] = np.sqrt(np.einsum("ijk,ijk->ik", *[twists.reshape(2, 3, -1)] * 2))
         origins = np.array([place.translation for place in data.oMi])
-        self.speed = self._speeds(origins, centers, self._size)
+        self._bound_speeds(origins, centers, self._size)
         if not self._finite[self.joint > 0].all():
             # Of a half-space only the part near other pieces matters: where two pieces are nearest, either of the two
             # points gives the same speed along the normal, and all other pieces stay within this sphere.
             travel = self.speed.sum(axis=1)
             extent = self._size + travel
-            around = np.linalg.norm(centers[:, None] - centers, axis=2) + extent + travel[:, None]
-            wide = np.where(self._finite, around, 0.0).max(axis=1, initial=0.0)
-            self.speed = self._speeds(origins, centers, np.where(self._finite, self.reach, wide))
+            reach = self.reach.copy()
+            for endless in np.flatnonzero(~self._finite).tolist():
+                around = np.linalg.norm(centers[endless] - centers, axis=1) + extent + travel[endless]
+                reach[endless] = around.max(initial=0.0, where=self._finite)
+            self._bound_speeds(origins, centers, reach)
 
-    def _speeds(self, origins: Array, centers: Array, reach: Array) -> Array:
+    def _bound_speeds(self, origins: Array, centers: Array, reach: Array) -> None:
         """Translations of the joints, and rotations times the distances to the pieces along the moving joints."""
         moving = ((self._slide > 0.0) | (self.turn > 0.0)).tolist()
         above = [0] * len(moving)  # the joint that moves, itself or the nearest to the root
@@ -91,30 +98,42 @@ class MotionBounds:
         for j in range(1, len(moving)):
             if moving[j]:
                 depth[j] = depth[inner[j]] + lengths[j]
-        along, first = np.array(depth), np.array(above)[self.joint]
-        lever = centers - origins[first]
-        own = np.sqrt(np.einsum("ij,ij->i", lever, lever)) + reach
+        carried, joint = self._carried, self.joint[self._carried]
+        along, first = np.array(depth), np.array(above)[joint]
+        lever = centers[carried] - origins[first]
+        own = np.sqrt(np.einsum("ij,ij->i", lever, lever)) + reach[carried]
         farthest = (own + along[first])[:, None] - along
-        return np.where(self.carries[self.joint], self._slide + self.turn * farthest, 0.0)
+        self.speed[carried] = np.where(self.carries[joint], self._slide + self.turn * farthest, 0.0)
 
     def approach(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> Array:
         """Largest rate of change of the distance of each pair, (k,), metres for the whole motion."""
-        against = self.speed @ ~self.carries.T  # of each piece against what each joint carries
-        return np.asarray(against[first, self.joint[second]] + against[second, self.joint[first]])
+        # of each piece that is carried, and at last of one that is not, against what each joint carries
+        against, row, joint = self._against, self._row, self.joint
+        np.matmul(self.speed[self._carried], self._others, out=against[:-1])
+        return np.asarray(against[row[first], joint[second]] + against[row[second], joint[first]])
 
 
-def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
-    """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.
+def pair_kinds(table: PairTable) -> tuple[Indices, Indices]:
+    """A pair (k, 2) for each kind, and the kind of every pair (pairs,): to what stands one piece comes alike."""
+    count = len(table.joint)
+    moving = np.where(table.joint > 0, np.arange(count), count)
+    first, second = moving[table.pairs].T
+    _, row, kind = np.unique(first * (count + 1) + second, return_index=True, return_inverse=True)
+    return table.pairs[row], np.asarray(kind, dtype=np.intp)
+
+
+def largest_approach(table: PairTable, centres: Array, most: Array, pairs: Indices) -> Array:
+    """Most by which the distances of pairs (k, 2) of pieces can fall (k,), metres; infinite where nothing is known.
 
     `centres` (n,): how far a piece's origin is from its joint's, infinite where placed anew; `most` (nv,) or (nv, m):
-    largest displacements of one motion or of m, radians and metres, for which the answer is (pairs, m).
+    largest displacements of one motion or of m, radians and metres, for which the answer is (k, m).
     """
     model = table.model
     moved = np.array([_motion(model, joint, most) for joint in range(model.njoints)])
     lengths = np.array([_length(model, joint) for joint in range(model.njoints)])
     parents = np.array(list(model.parents), dtype=np.intp)
-    joint = table.joint[table.pairs]
-    own, lever = (centres + table.reach)[table.pairs], np.zeros(joint.shape)
+    joint = table.joint[pairs]
+    own, lever = (centres + table.reach)[pairs], np.zeros(joint.shape)
     approach = np.zeros((len(joint), *most.shape[1:]))
     with np.errstate(invalid="ignore"):  # an infinite lever of what does not turn
         # a joint comes after the one that carries it: the later of two is never an ancestor of the other

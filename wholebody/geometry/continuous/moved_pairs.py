@@ -34,7 +34,7 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
     one, other = before.contacts, after.contacts
     near = one.number, one.distance, float(before.within), other.number, other.distance, float(after.within)
     found: Indices = compiled_kernel().far_moved(
-        before.placements, after.placements, (table.pairs, table.widths, table.reach), near
+        before.placements, after.placements, (table.pairs, table.widths, table.reach), table.blocks, near
     )
     return found
 
@@ -59,7 +59,7 @@ def compiled_kernel(moved_pairs_kernel: Any) -> None:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     placements, near = np.zeros((0, 4, 3)), (places, none, 0.0, places, none, 0.0)
-    moved_pairs_kernel.far_moved(placements, placements, (pairs, none, none), near)
+    moved_pairs_kernel.far_moved(placements, placements, (pairs, none, none), (places,) * 5, near)
     pieces = none, np.zeros((0, 3)), places, np.zeros((0, 3)), places, np.zeros((0, 4))
     moved_pairs_kernel.kept_apart(placements, placements, (pairs, none, *pieces), (none, none, np.zeros((0, 2)), none))
 

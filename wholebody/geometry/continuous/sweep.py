@@ -62,9 +62,10 @@ class FirstContact:
 class Sweep:
     """Sweeps of one model and geometry; one object serves many motions."""
 
-    def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
-        """Read the pieces and pairs once; an InputError for a joint whose motion cannot be bounded, or other shapes."""
-        self.model, self.geometry, self._table = model, geometry, PairTable(model, geometry)
+    def __init__(self, model: pin.Model, geometry: pin.GeometryModel, table: PairTable | None = None) -> None:
+        """Take a geometry, its table or None to make it; an InputError for a joint without bounds, or other shapes."""
+        self.model, self.geometry = model, geometry
+        self._table = PairTable(model, geometry) if table is None else table
         self._data, self._pairs = model.createData(), self._table.pairs
         self._distances = PairDistances(geometry, self._pairs)
         self._bounds = MotionBounds(model, self._table.joint, self._table.reach)
