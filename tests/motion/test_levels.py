@@ -59,6 +59,18 @@ def test_a_foot_that_is_set_down_beside_where_it_was_rests_at_two_places() -> No
     assert found[55:].all()
 
 
+@pytest.mark.parametrize(("noise", "rests"), [(0.0, False), (0.002, True)])
+def test_a_rest_of_a_noisy_recording_may_drift(noise: float, rests: bool) -> None:
+    """A foot stands for 0.3 s and goes on at 0.24 m/s, in a recording at 120 Hz; the noise is that of markers."""
+    times = np.arange(66) / 120.0
+    at = noise * np.random.default_rng(0).standard_normal((66, 3))
+    at[:, 0] += 0.24 * np.clip(times - 0.3, 0.0, None)
+    found = slow(at, 1.0 / 120.0, RestLimits())
+    assert found[6:30].all()
+    assert found[44:60].all() == rests
+    assert rests or not found[44:].any()
+
+
 def test_feet_that_hang_over_an_edge_are_not_drawn_to_the_floor(human: wb.Figure) -> None:
     """Feet rest at the height of a box that the scene does not have there: they stay where they are."""
     low = person(20, 1.1)

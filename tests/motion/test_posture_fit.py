@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import wholebody as wb
 from wholebody.motion.held_points import HeldPoint
@@ -32,3 +33,30 @@ def test_a_short_lever_does_not_turn_past_a_place_that_it_cannot_reach(tmp_path:
             assert q[0] <= following[0] <= 0.1 + 1e-6  # the place nearest to it, by the arc
             q = following
     assert q[0] > 0.05
+
+
+TIP = np.array([0.5, 0.0, 0.0])
+ARM = """<robot name="arm"><link name="base"/><link name="tip">
+<collision><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.02 0.02"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_a_step_does_not_end_inside_what_was_far_away_when_it_began(tmp_path: Path) -> None:
+    """The end of an arm of 0.5 m is drawn 0.12 m aside, into a block that is 4 cm from it."""
+    (path := tmp_path / "arm.urdf").write_text(ARM)
+    figure = wb.load(path)
+    scene = wb.Scene(figure).add(wb.Box((0.1, 0.1, 0.1)), name="block", at=(0.45, 0.1, 0.0))
+    layout = Layout([], [], np.zeros((0, 0)), np.zeros(0), np.zeros(0), [HeldPoint("left_wrist", "", 1, TIP)])
+    goals = Goals(
+        np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array([[0.485, 0.12, 0.0]]), np.full((1, 3), 10.0),
+        figure.neutral, np.zeros(1),
+    )  # fmt: skip
+    with scene.borrow() as workspace:
+        fitter = Fitter(figure, layout, workspace)
+        assert fitter.depth(fitter.step(figure.neutral, goals)) > 0.02
+        q = fitter.careful_step(figure.neutral, goals, None)
+        assert fitter.depth(q) < 0.01
+        q = fitter.careful_step(q, goals, None)
+        assert fitter.depth(q) < 5e-4
+    assert q[0] == pytest.approx(0.04 / 0.5, abs=0.01)  # it stops before the block, and is not pushed through

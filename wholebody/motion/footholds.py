@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.windows import Window, long_runs, runs
@@ -20,6 +21,9 @@ BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half o
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
 SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
 TREMBLES = 0.015  # m: by which a point that rests goes to and fro, as markers do
+SMOOTH = 0.04  # s: standard deviation over which places are smoothed to tell speeds of the body from those of noise
+TELLING = 0.4  # m/s below which speeds tell the noise
+QUIET, NOISE = 0.1, 0.5  # m/s of noise that changes no limit; share of what is above by which a rest may be faster
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -60,6 +64,17 @@ def _steady(places: Array, dt: float, stayed: float) -> Array:
     extent = np.linalg.norm(np.ptp(around, axis=1), axis=1) - TREMBLES
     moved = np.linalg.norm(around[:, half + 1 :].mean(axis=1) - around[:, :half].mean(axis=1), axis=1)
     return np.asarray(np.minimum(speeds(places, dt, SPAN), np.maximum(extent, 2.0 * moved - TREMBLES) / time))
+
+
+def _noise(places: Array, dt: float) -> tuple[Array, float]:
+    """(n,) speeds of a point (n, 3) without noise, and the noise: the median speed of it where the point is slow."""
+    if len(places) < 2:
+        return np.zeros(len(places)), 0.0
+    raw = np.gradient(places, dt, axis=0)
+    smooth = np.gradient(gaussian_filter1d(places, SMOOTH / dt, axis=0, mode="nearest"), dt, axis=0)
+    speed = np.linalg.norm(smooth, axis=1)
+    near = speed < TELLING
+    return speed, float(np.median(np.linalg.norm((raw - smooth)[near], axis=1))) if near.any() else 0.0
 
 
 class Point(NamedTuple):
@@ -108,8 +123,11 @@ def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point
 
 def slow(places: Array, dt: float, limits: RestLimits) -> Mask:
     """(n,) rest frames of a point (n, 3) by speed alone; the fastest frames of a slow motion separate two rests."""
-    speed = _steady(places, dt, limits.stayed)
-    low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= limits.speed
+    speed, most = _steady(places, dt, limits.stayed), limits.speed
+    if limits.stayed:
+        smooth, noise = _noise(places, dt)
+        speed, most = np.minimum(speed, smooth), most + NOISE * max(noise - QUIET, 0.0)
+    low, high = speed <= 2.0 / 3.0 * limits.speed, speed <= most
     kept = np.zeros(len(speed), dtype=bool)
     for run in runs(high):
         kept[run.first : run.end] = bool(low[run.first : run.end].any())
