@@ -146,7 +146,12 @@ paths:
         _path_or_live,
         option("--method", default="qp", metavar="NAME", help=f"{', '.join(METHODS)} (default: qp)"),
         option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
-        option("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)"),
+        option(
+            "--goal",
+            type=int,
+            metavar="N",
+            help="which goal, from 0 (default: first point or frame, else first relative)",
+        ),
         option("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)"),
         option("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)"),
         option(
@@ -157,7 +162,13 @@ paths:
             metavar=("X", "Y", "Z"),
             help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
         ),
-        option("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m"),
+        option(
+            "--to",
+            type=float,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help="end of a line, m; of a relative goal in the axes of its to",
+        ),
         option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)"),
         epilog="""\
 --live opens a page instead: drag the handles on hands, feet, pelvis, head and things with the mouse, click one to
