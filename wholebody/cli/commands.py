@@ -133,10 +133,10 @@ exit code: 1 if a frame overlaps by more than the tolerance, passes through some
         "drag a goal of a task along a path, frame by frame",
         """\
 Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at a constant speed; a
-frame keeps its orientation, and the places of a relative goal are in the axes of its frame "to". The figure follows frame by frame and at the end meets the goal to 1e-5 m. Print a table
-of times and remaining errors, assessed independently in every frame and between frames. Write into a folder the
-table (Markdown), the numbers of every frame (CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens
-without a network).
+frame keeps its orientation, and the places of a relative goal are in the axes of its frame "to". The figure follows
+frame by frame and at the end meets the goal to 1e-5 m. Print a table of times and remaining errors, assessed
+independently in every frame and between frames. Write into a folder the table (Markdown), the numbers of every frame
+(CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens without a network).
 
 paths:
   line      from the start of the dragged frame to --to, or to the goal's target
