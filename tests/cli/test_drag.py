@@ -72,4 +72,4 @@ def test_a_bad_file_of_places_is_named_with_its_line(
 def test_a_task_without_a_goal_that_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "none.toml").write_text('[figure]\nname = "avatar"\n')
     assert main(["drag", str(tmp_path / "none.toml"), "--path", "line"]) == 2
-    assert "no point or frame goal" in capsys.readouterr().err
+    assert "no point, frame or relative goal" in capsys.readouterr().err

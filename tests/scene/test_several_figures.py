@@ -312,6 +312,15 @@ def test_a_file_holds_several_figures(tmp_path: Path, ending: str, ben: wb.Figur
         wb.read_clip(one, figure)
 
 
+@pytest.mark.parametrize("ending", [".npz", ".csv", ".bvh", ".glb"])
+def test_a_file_of_several_says_so_where_one_is_meant(tmp_path: Path, ending: str, ben: wb.Figure) -> None:
+    figure = wb.Scene({"anna": ben, "ben": (ben, TURNED)}).figure
+    path = wb.Clip(figure, np.array([figure.neutral] * 3), 0.1).write(tmp_path / f"all{ending}")
+    with pytest.raises(FileFormatError, match=r"is of figures that are called anna.*scene\.figure.*--scene"):
+        wb.read_clip(path, ben)
+    assert wb.read_clip(path, figure).figure is figure
+
+
 def test_a_tracked_person_is_stopped_by_another(anna: wb.Figure, ben: wb.Figure) -> None:
     scene = wb.Scene({"anna": anna, "ben": (ben, (1.0, 0.05, 0.0, 0.0, 0.0, 1.0, 0.0))})
     figure = scene.figure

@@ -6,10 +6,12 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
 from tests.needs import each
+from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.methods import control
 
 
@@ -87,6 +89,50 @@ def test_frames_whose_time_is_spent_are_free_and_arrive(
     # to the end, a search of the goal inside takes 7 Newton steps or 143 sweeps
     assert max(frame.iterations for frame in inside) <= {"ccd": 110, "newton": 4}.get(method, 11)
     assert any(drag.to((0.3, -0.25, 1.0)).error < 2e-3 for _ in range(60))
+
+
+def test_a_frame_that_needs_more_than_its_time_gets_more(scene: wb.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clocks are read ten times in a Newton step; here two readings are a frame's time."""
+    drag = wb.tracking.Drag(_problem(scene), "newton", budget=0.01)
+    wb.tracking.Drag(_problem(scene), "newton").to(_circle(0.0))  # compiles, which reads clocks too
+    ticks = itertools.count()
+    monkeypatch.setattr(control.time, "thread_time", lambda: 0.005 * next(ticks))
+    assert any(drag.to((0.3, -0.25, 1.0)).error < 2e-3 for _ in range(60))
+
+
+@pytest.mark.parametrize("method", each(["qp", "newton", "ccd", "dls"]))
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_tool_is_dragged_at_that_of_another_arm(method: str, turned: bool) -> None:
+    """While it is dragged the other one goes away, so the place is one in the other's axes."""
+    arm, ready = known_arm("ur5")
+    scene = wb.Scene({"left": (arm, (0.0, 0.45, 0.0)), "right": (arm, (0.0, -0.45, 0.0))})
+    figure, start = scene.figure, scene.figure.posture({"left": ready, "right": ready})
+
+    def apart(q: np.ndarray) -> pin.SE3:  # type: ignore[type-arg]
+        state = pin.Data(figure.model)
+        pin.framesForwardKinematics(figure.model, state, q)
+        left, right = (state.oMf[figure.model.getFrameId(f"{name}/tool")] for name in ("left", "right"))
+        return left.actInv(right)
+
+    before = apart(start)
+    way = wb.Point("left/tool", figure.placement(start, "left/tool").translation + (0.05, 0.05, -0.05))
+    relative = wb.Relative("right/tool", "left/tool", orientation=turned)
+    drag = wb.tracking.Drag(wb.Problem(scene, start, goals=[way, relative]), method, goal=1, budget=0.02)
+    turn = pin.exp3(np.array((0.0, 0.2, 0.1)))
+    for share in np.linspace(0.1, 1.0, 10):
+        target = pin.SE3(before.rotation @ turn, before.translation + share * np.array((0.02, 0.03, -0.04)))
+        drag.to(target if turned else target.translation)
+    end = drag.finish()
+    assert end.assessment.goal_error < 1.1e-5, end
+    found = apart(end.q)
+    assert found.translation == pytest.approx(target.translation, abs=2e-5)
+    assert not turned or found.rotation == pytest.approx(target.rotation, abs=2e-5)
+
+
+def test_what_has_no_place_is_not_dragged(scene: wb.Scene) -> None:
+    problem = wb.Problem(scene, goals=[wb.CenterOfMass((0.0, 0.0, 0.9))])
+    with pytest.raises(wb.InputError, match="a Point, a Frame, an Orientation or a Relative can be moved"):
+        wb.tracking.Drag(problem)
 
 
 def test_a_thing_goes_the_rest_of_its_way_when_the_time_is_spent_and_what_it_meets_is_named(planar_arm) -> None:

@@ -14,6 +14,7 @@ import pytest
 import wholebody as wb
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
+from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.cli.main import main
 from wholebody.view import side_by_side
@@ -134,6 +135,47 @@ def test_arms_on_fixed_bases_stand_beside_each_other_in_their_postures(monkeypat
     )
     assert 0.5 * (left + right) == pytest.approx(own)
     assert right - left == pytest.approx([0.0, side_by_side.APART, 0.0])
+
+
+def test_motions_of_several_figures_are_beside_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A person who carries a parcel, and an arm on a fixed base that faces him."""
+    (arm, ready), place = known_arm("ur5"), pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 2.0), np.array((0.9, 0.1, 0.7)))
+    scene = wb.Scene({"ben": wb.load("avatar"), "arm": (arm, place)})
+    rests = ["ben/left_hand", "arm/link6"]
+    scene.attach(wb.Sphere(0.05), to="ben/left_palm", name="parcel", at=(0.0, 0.0, 0.06), rests_on=rests)
+    figure, drawn = scene.figure, []
+    q = figure.posture({"arm": ready})
+    bent = figure.with_joints(q, {"ben/left_elbow_flexion": 0.8})
+    clip = wb.Clip(figure, np.array([q, bent]), 0.1)
+
+    def viewed(world: wb.Scene, *rest: Any, **options: Any) -> ViewedWorld:
+        drawn.append(world)
+        return ViewedWorld(world, *rest, **options)
+
+    shown: list[Any] = []
+    monkeypatch.setattr(side_by_side, "ViewedWorld", viewed)
+    monkeypatch.setattr(Viewer, "play", lambda viewer, postures, dt: shown.extend(postures))
+    side_by_side.beside(None, {"before": clip, "after": clip}, scene, "two")
+    world, names = drawn[0], ("ben/left_palm", "arm/tool", "ben/head")
+    assert set(world.objects) == {"floor", "parcel of before", "parcel of after"}
+    for was, now in zip((q, bent), shown, strict=True):
+        posture = now[: world.model.nq]
+        apart = [
+            world.figure.placement(posture, f"after {name}").translation
+            - world.figure.placement(posture, f"before {name}").translation
+            for name in names
+        ]
+        assert np.ptp(apart, axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
+        assert apart[0][1] >= side_by_side.APART
+        for name in names[1:]:
+            found = world.figure.placement(posture, f"before {names[0]}").actInv(
+                world.figure.placement(posture, f"before {name}")
+            )
+            own = figure.placement(was, names[0]).actInv(figure.placement(was, name))
+            assert found.homogeneous == pytest.approx(own.homogeneous, abs=1e-9)
+    monkeypatch.undo()
+    page = motion_curves(None, {"before": clip, "after": clip}, scene)
+    assert max(lines(page, "joints")["ben/left_elbow_flexion", "before"]) == pytest.approx(0.8, abs=1e-3)
 
 
 def test_things_that_cannot_be_drawn_are_refused() -> None:

@@ -133,10 +133,10 @@ exit code: 1 if a frame overlaps by more than the tolerance, passes through some
         "drag a goal of a task along a path, frame by frame",
         """\
 Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at a constant speed; a
-frame keeps its orientation. The figure follows frame by frame and at the end meets the goal to 1e-5 m. Print a table
-of times and remaining errors, assessed independently in every frame and between frames. Write into a folder the
-table (Markdown), the numbers of every frame (CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens
-without a network).
+frame keeps its orientation, and the places of a relative goal are in the axes of its frame "to". The figure follows
+frame by frame and at the end meets the goal to 1e-5 m. Print a table of times and remaining errors, assessed
+independently in every frame and between frames. Write into a folder the table (Markdown), the numbers of every frame
+(CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens without a network).
 
 paths:
   line      from the start of the dragged frame to --to, or to the goal's target
@@ -146,7 +146,12 @@ paths:
         _path_or_live,
         option("--method", default="qp", metavar="NAME", help=f"{', '.join(METHODS)} (default: qp)"),
         option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
-        option("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)"),
+        option(
+            "--goal",
+            type=int,
+            metavar="N",
+            help="which goal, from 0 (default: first with a place)",
+        ),
         option("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)"),
         option("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)"),
         option(
@@ -157,7 +162,13 @@ paths:
             metavar=("X", "Y", "Z"),
             help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
         ),
-        option("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m"),
+        option(
+            "--to",
+            type=float,
+            nargs=3,
+            metavar=("X", "Y", "Z"),
+            help="end of a line, m",
+        ),
         option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)"),
         epilog="""\
 --live opens a page instead: drag the handles on hands, feet, pelvis, head and things with the mouse, click one to

@@ -18,7 +18,7 @@ from wholebody.cli.tables import bar, print_rows
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 from wholebody.taskfile import Task, read_task, write_task
-from wholebody.tasks import Frame, Orientation, Point
+from wholebody.tasks import Frame, Orientation, Point, Relative
 from wholebody.tasks.inputs import point
 from wholebody.tracking.dragging import (
     Dragged,
@@ -92,11 +92,15 @@ def followed(problem: Problem, places: Any, method: str, goal: int, label: str) 
 
 def _goal(problem: Problem, number: int | None) -> int:
     if number is None:
-        number = next((k for k, goal in enumerate(problem.goals) if isinstance(goal, (Point, Frame))), None)
+        kinds = (Point, Frame), (Relative,)
+        found = (k for kind in kinds for k, goal in enumerate(problem.goals) if isinstance(goal, kind))
+        number = next(found, None)
         if number is None:
-            raise InputError("the task has no point or frame goal that could be dragged; give it one")
+            raise InputError("the task has no point, frame or relative goal that could be dragged; give it one")
     if isinstance(moving_goal(problem, number), Orientation):
-        raise InputError(f"--goal: goals[{number}] is an Orientation, which has no place; name a point or a frame")
+        raise InputError(
+            f"--goal: goals[{number}] is an Orientation, which has no place; name a point, a frame or a relative"
+        )
     return number
 
 

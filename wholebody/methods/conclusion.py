@@ -35,7 +35,7 @@ class Ending(NamedTuple):
     how: str  # text after "solved" in the message
     unit: str = "iterations"  # name of what a method that did not converge ran out of
     failure: str = ""  # why the method could not continue, in words; "" if it could
-    caveat: str = ""  # text of the message if a constraint is violated
+    caveat: str = ""  # text of the message if something is violated that the method does not see
     remark: str = ""  # text at the end of every message
     # contradictions of the problem that the search found; None if it did not look for any
     contradictions: tuple[Contradiction, ...] | None = None
@@ -102,10 +102,11 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
         return f"{ending.unreached}: nothing is violated, {left}"
     if judgement.holds(enough):
         return f"ran out of {ending.unit}: {left}"
-    name, missed = _worst(problem, judgement, ending.q)
+    name, missed, seen = _worst(problem, judgement, ending.q)
     why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
-    caveat = f"; {ending.caveat}" if ending.caveat else ""
-    return f"{why}: {name} is missed by {missed:.3g} m or rad{caveat}"
+    if ending.caveat and not seen:
+        why = ending.caveat
+    return f"{why}: {name} is missed by {missed:.3g} m or rad"
 
 
 def _undefined(status: Status, control: Control) -> str:
@@ -129,17 +130,17 @@ def _way_out(problem: Problem, judgement: Assessment) -> str:
     return ""
 
 
-def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float]:
-    """The most violated constraint, and its violation."""
+def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float, bool]:
+    """The most violated constraint, its violation, and whether a method that sees what is stated alone sees it."""
     clearance = max(judgement.clearance_violation, judgement.penetration)
-    parts = ("the clearance of a pair", clearance), ("a joint limit", judgement.limit_violation)
+    parts = ("the clearance of a pair", clearance, False), ("a joint limit", judgement.limit_violation, True)
     worst = max(parts, key=lambda item: item[1])
     state = State(problem.scene.model).update(q)
     for name, term in zip(problem.constraint_names, problem.constraints, strict=True):
         value = np.atleast_1d(term.value(state))
         missed = float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0))
         if missed > worst[1]:
-            worst = (name, missed)
+            worst = (name, missed, term not in problem.defaults)
     return worst
 
 

@@ -77,7 +77,7 @@ class DampedLeastSquares(Checked, Descends):
         converged = descent.run()
         return Ending(
             descent.best, converged, descent.steps, tuple(descent.trace), f"in {descent.steps} steps", unit="steps",
-            caveat="contacts are not seen by this method",
+            caveat="this method sees neither contacts nor what people have by default",
         )  # fmt: skip
 
 

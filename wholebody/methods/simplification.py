@@ -162,9 +162,10 @@ class Reach:
     def __init__(self, model: pin.Model, start: Array, resting: Balls, joint: Indices, frozen: Iterable[int]) -> None:
         """Read the joints; `start` (nq,) counts as possible, `resting` are balls around pieces in their joints (n,)."""
         self._model, self._start, self._frozen = model, start, set(frozen)
-        data = model.createData()
-        pin.forwardKinematics(model, data, start)
         self._still: dict[int, pin.SE3] = {}
+        if self._frozen:
+            data = model.createData()  # takes as long as all the rest
+            pin.forwardKinematics(model, data, start)
         self._ranges: dict[int, Range | None] = {}
         self._near: list[list[int]] = [[] for _ in range(model.njoints)]
         for j in range(1, model.njoints):
@@ -272,9 +273,11 @@ def reachable_pairs(problem: Problem, kept: set[int], rests: Mask, numbers: Indi
         reach = Reach(model, start, _resting(scene.geometry, table.reach), joint, kept)
     # m: largest displacement of a piece by errors of holds; an accepted answer has less
     views = [(reach.seen_from(0), 0.0), *((b, 1e-3) for b in held_balls(scene.figure, reach, problem.constraints))]
-    data = model.createData()
-    pin.forwardKinematics(model, data, start)
-    at = np.array([_columns(data.oMi[piece.parentJoint] * piece.placement) for piece in scene.geometry.geometryObjects])
+    with scene.figure.posed(start) as state:
+        joints = state.data.oMi
+        at = np.array(
+            [_columns(joints[piece.parentJoint] * piece.placement) for piece in scene.geometry.geometryObjects]
+        )
     open_, fixed = np.ones(len(pairs), dtype=bool), rests[joint[pairs]]
     row = np.flatnonzero(fixed[:, 0] != fixed[:, 1])
     side = fixed[row, 1].astype(np.intp)  # of the piece that is fixed

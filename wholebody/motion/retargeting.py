@@ -17,6 +17,7 @@ from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.motion.clip import Clip, thing_tracks
+from wholebody.motion.files.base import check_one
 from wholebody.motion.held_points import held_points, touching_points
 from wholebody.motion.holds import Holds, Touched
 from wholebody.motion.posture_fit import Fitter
@@ -98,6 +99,7 @@ def retarget(
     """
     motion = checked_motion(motion, "retarget: motion")
     one_figure(figure, "retarget: figure")
+    check_one(motion.names, figure, f"the skeleton of {motion.name}")
     function(progress, "progress")
     if scene is not None:
         same_figure(instance(scene, Scene, "retarget: scene", "make one with wb.Scene(figure)"), figure)

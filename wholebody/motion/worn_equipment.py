@@ -16,6 +16,7 @@ from wholebody.base.checks import choice, color, instance, known, listed, number
 from wholebody.base.errors import InputError
 from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
+from wholebody.figures.loading import one_figure
 from wholebody.figures.postures import support
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Box, Mesh, Shape, Sphere
@@ -236,6 +237,7 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
     """
     known(name, READY, "equipment", "equipment")
     instance(figure, Figure, "equipment: figure", "load one with wb.load('human')")
+    one_figure(figure, f"equipment {name!r} fits one person, and the figure")
     if not {"lower_thorax", "thorax"} <= set(figure.segments):
         raise InputError(
             f"equipment {name!r} fits a person, and {figure.name!r} lacks lower_thorax, thorax; "

@@ -23,6 +23,7 @@ from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
+from wholebody.tasks import Relative
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget, warm_started
 
@@ -110,19 +111,21 @@ class ProblemDrag:
         with self._alone, within_budget(self._moves.budget):
             retarget(self.problem, self._number, target)
             self.workspace.refresh()
+            before = self.q
             collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
             if np.isinf(self.tracker.unswept):
                 step = self.tracker.frame(self.q) if self._seconds == np.inf else next(self._frames())
                 self.q, iterations = step.q, step.iterations
                 collisions, path = getattr(step, "collisions", ()), getattr(step, "path", ())
             else:
-                before, self._motion = self.q, self.workspace.next_frame(self.q)
+                self._motion = self.workspace.next_frame(self.q)
                 iterations = self._followed()
                 if self._motion is not None:
                     collisions = judged(self.workspace, self._motion, before, self.q)
                     path = ((0.0, before), (1.0, self.q))
             if self._seconds < np.inf:
-                self._moves.end(self._left()[1])
+                still = np.allclose(before, self.q, rtol=0.0, atol=1e-9)  # m, rad: of rounding
+                self._moves.end(self._left()[1], cut=BUDGET.over and still)
             error = goal_error(self.problem, self.workspace, self.q)
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
@@ -152,12 +155,12 @@ class ProblemDrag:
 
     def _frames(self) -> Iterator[Step]:
         goal = moving_goal(self.problem, self._number)
-        left, error = self._left()
+        (left, error), target = self._left(), goal.placement if isinstance(goal, Relative) else goal.target
         for share in self._moves.shares(error):
             if share < 1.0:
                 retarget(self.problem, self._number, interpolated_target(goal, left, share))
             step = self.tracker.frame(self.q)
-            retarget(self.problem, self._number, goal.target)
+            retarget(self.problem, self._number, target)
             yield step
 
     def _left(self) -> tuple[Array, float]:
@@ -292,7 +295,8 @@ class Drag(NotCopyable, Generic[Answer]):
         """Begin a drag at the problem's start, or where the assembly's bodies are.
 
         Args:
-            problem: with the goal that will move, a `Point`, a `Frame` or an `Orientation`; or an assembly with a goal.
+            problem: with the goal that will move, a `Point`, a `Frame`, an `Orientation` or a `Relative`, whose target
+                is in the axes of its `to`; or an assembly with a goal.
             method: "qp", "ccd", "newton" or another by name, with a tolerance of 1e-5 at the end and no restarts; or a
                 configured method, which is used as it is. An assembly has one method only.
             goal: index of the goal that moves.

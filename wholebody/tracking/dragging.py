@@ -21,7 +21,7 @@ from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tracking.drag import Drag, DragFrame
 from wholebody.tracking.frame import FRAME
-from wholebody.tracking.moving_goals import copied, moving_goal, retarget
+from wholebody.tracking.moving_goals import copied, moving_goal, retarget, target_of
 
 Counts = NDArray[np.intp]
 
@@ -100,7 +100,8 @@ def present_position(problem: Problem, goal: int = 0) -> Array:
 def target_position(problem: Problem, goal: int = 0) -> Array:
     """Position of a goal's target, (3,) metres; raises like `present_position`."""
     term = moving_goal(problem, goal)
-    return np.array(term.resolved_target if isinstance(term, Point) else term.resolved_target.translation, dtype=float)
+    target = target_of(term)
+    return np.array(target if isinstance(term, Point) else target.translation, dtype=float)
 
 
 def drag_along(
@@ -117,8 +118,8 @@ def drag_along(
     A figure that lags behind gets more frames at the last position until it comes to rest.
 
     Args:
-        problem: with the goal that moves, a `Point` or a `Frame`, which keeps its orientation.
-        places: (n, 3) metres.
+        problem: with the goal that moves, a `Point`, or a `Frame` or a `Relative`, which keep their orientation.
+        places: (n, 3) metres, of a `Relative` in the axes of its `to`.
         method: see `Drag`, as for what is raised.
         goal: index of the goal that moves.
         dt: seconds from frame to frame.
@@ -189,4 +190,4 @@ def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudg
 def _aim(problem: Problem, goal: int, place: Array) -> Array | pin.SE3:
     """The target of a moving goal at a position (3,)."""
     term = moving_goal(problem, goal)
-    return place if isinstance(term, Point) else pin.SE3(term.resolved_target.rotation, place)
+    return place if isinstance(term, Point) else pin.SE3(target_of(term).rotation, place)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import pinocchio as pin
 
@@ -17,8 +17,10 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.base import Tracker, check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.tasks import Frame, Orientation, Point
+from wholebody.tasks import Frame, Orientation, Point, Relative
 from wholebody.tasks.base import Goal
+
+MovingGoal: TypeAlias = Point | Frame | Orientation | Relative
 
 PASSING = 1e-3  # m: if the motion to a solution gets deeper, a nearer solution is tried
 
@@ -30,36 +32,44 @@ def copied(problem: Problem) -> Problem:
     return copy.copy(problem)
 
 
-def moving_goal(problem: Problem, number: int) -> Point | Frame | Orientation:
+def moving_goal(problem: Problem, number: int) -> MovingGoal:
     """The goal of this index; raises InputError where there is none, or it is of another kind than these."""
     if not problem.goals:
         raise InputError("the problem has no goals; give it a Point or a Frame")
     number = whole(number, "the number of the goal", 0, len(problem.goals) - 1)
     goal = problem.goals[number]
-    if not isinstance(goal, (Point, Frame, Orientation)):
+    if not isinstance(goal, (Point, Frame, Orientation, Relative)):
         raise InputError(
-            f"goals[{number}] is a {type(goal).__name__}; only a Point, a Frame or an Orientation can be moved"
+            f"goals[{number}] is a {type(goal).__name__}; a Point, a Frame, an Orientation or a Relative can be moved"
         )
     return goal
+
+
+def target_of(goal: MovingGoal) -> Any:
+    """Where a resolved goal is: a position (3,) of a point, a placement of others, a relative one's in its `to`."""
+    return goal.resolved_target if isinstance(goal, Point) else goal.residual.placement
 
 
 def retarget(problem: Problem, number: int, target: Any) -> None:
     """Move a goal of `moving_goal` to another target; raises InputError where one of them is none."""
     goals: list[Goal] = list(problem.goals)
-    goals[number] = replace(moving_goal(problem, number), target=target)
+    goal = moving_goal(problem, number)
+    goals[number] = replace(goal, placement=target) if isinstance(goal, Relative) else replace(goal, target=target)
     problem.retarget(goals)
 
 
-def interpolated_target(goal: Point | Frame | Orientation, error: Array, share: float) -> Any:
+def interpolated_target(goal: MovingGoal, error: Array, share: float) -> Any:
     """A target between the frame, which has this error, and the goal: at a share of the distance."""
+    target = target_of(goal)
     if isinstance(goal, Point):
-        return goal.resolved_target + (1.0 - share) * error
-    target = goal.resolved_target
+        return target + (1.0 - share) * error
     if isinstance(goal, Orientation):
         return pin.exp3((1.0 - share) * error) @ target.rotation
-    here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
-    turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
-    return pin.SE3(turned, here.translation + share * (target.translation - here.translation))
+    there = target.translation + (1.0 - share) * error[:3]
+    if len(error) == 3:
+        return pin.SE3(target.rotation, there)
+    here = pin.exp3(error[3:]) @ target.rotation
+    return pin.SE3(here @ pin.exp3(share * pin.log3(here.T @ target.rotation)), there)
 
 
 def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:

@@ -6,6 +6,7 @@ import io
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -15,6 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import a, known, listed
 from wholebody.base.errors import InputError
 from wholebody.base.files import Scratch, checked_target, write
+from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Capsule, HalfSpace
 from wholebody.motion.clip import Clip
 from wholebody.motion.skeleton import SkeletonMotion
@@ -25,6 +27,31 @@ from wholebody.view.viewer import Viewer
 
 APART, RADIUS = 1.4, 0.022  # m: from one motion to the next, least; of a bone
 SHORT = 0.01  # m: shorter bones are not drawn
+
+
+class _Body(NamedTuple):
+    """A figure of a clip: its only one, or one of several."""
+
+    name: str  # in the scene of all motions
+    figure: Figure
+    at: pin.SE3  # where its world is in that of the clip
+    q: Array  # (n, nq) its postures
+    prefix: str  # what its names begin with in the clip
+
+    @property
+    def free(self) -> bool:
+        """Whether its postures place it."""
+        return self.figure.root == "free"
+
+    @property
+    def way(self) -> Array:
+        """(n, 3) where it is in each frame: its root, or the middle of the joints of what stands on a fixed base."""
+        if self.free:
+            return self.q[:, :3]
+        data = self.figure.model.createData()
+        pin.forwardKinematics(self.figure.model, data, self.q[0])
+        middle = np.mean([at.translation for at in data.oMi], axis=0)
+        return np.tile(self.at.act(middle), (len(self.q), 1))
 
 
 def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scene, title: str) -> Viewer:
@@ -40,19 +67,22 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
         InputError: motions of other numbers of frames, or two names that differ in "/" and " " alone.
     """
     _check(motion, clips, scene)
-    wide = max(APART, 0.5 + max(_way(clip)[1] for clip in clips.values()))
+    bodies = {name: _bodies(name, clip) for name, clip in clips.items()}
+    ways = {name: np.concatenate([body.way for body in those]) for name, those in bodies.items()}
+    wide = max(APART, 0.5 + max(np.ptp(way[:, 1]) for way in ways.values()))
     count = len(clips) + (motion is not None)
     first = -0.5 * wide * (count - 1)  # what looks against the x axis has y on its right
     aside = {name: first + wide * (number + (motion is not None)) for number, name in enumerate(clips)}
-    fixed = [name for name, clip in clips.items() if clip.figure.root == "fixed"]
-    world = _furnished(clips, scene, aside)
+    world = _furnished(bodies, scene, aside)
     tracks = {} if motion is None else _bones(world, motion, first)
     for name, clip in clips.items():
         for thing, track in clip.things.items():
             tracks[f"{thing} by {name}"] = [pin.XYZQUATToSE3(at + np.eye(7)[1] * aside[name]) for at in track]
     viewed = ViewedWorld(world, tracks, between_things=False)
     moved = [
-        clip.q if name in fixed else clip.q + np.eye(clip.q.shape[1])[1] * aside[name] for name, clip in clips.items()
+        body.q + np.eye(body.q.shape[1])[1] * aside[name] if body.free else body.q
+        for name, those in bodies.items()
+        for body in those
     ]
     parts = np.concatenate(moved, axis=1)
     postures = [
@@ -60,8 +90,10 @@ def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
     ]
     dt = next(iter(clips.values())).dt
     viewer = Viewer(viewed, title=title, contact_distance=-1e-4)  # overlaps alone are shown
-    middle = np.mean([_middle(clip) for clip in clips.values()], axis=0)
-    ahead = [_way(clip)[0] for clip in clips.values()] + ([] if motion is None else [np.ptp(motion.positions[:, 0, 0])])
+    middle = np.mean([way.mean(axis=0) for way in ways.values()], axis=0)
+    ahead = [np.ptp(way[:, 0]) for way in ways.values()] + (
+        [] if motion is None else [np.ptp(motion.positions[:, 0, 0])]
+    )
     away = 1.2 + 1.1 * wide * count + 0.6 * max(ahead)  # half the way, and some, comes towards the camera
     viewer.look(tuple(middle + away * np.array([0.9, 0.1, 0.25])), tuple(middle))
     viewer.play(postures, dt)
@@ -88,22 +120,23 @@ def _check(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scen
                 raise InputError(f"side by side: {thing} of {clip.name} moves; a half-space is drawn where it is")
 
 
-def _furnished(clips: Mapping[str, Clip], scene: Scene, aside: Mapping[str, float]) -> Scene:
+def _furnished(bodies: Mapping[str, Sequence[_Body]], scene: Scene, aside: Mapping[str, float]) -> Scene:
     """The figures, those on a fixed base at their place, with what each carries and what stands around each."""
     around = [each for each in scene.objects.values() if each.segment is None]
-    fixed = [name for name, clip in clips.items() if clip.figure.root == "fixed"]
     world = Scene(
         {
-            _figure(name): (clip.figure, (0.0, aside[name], 0.0)) if name in fixed else clip.figure
-            for name, clip in clips.items()
+            body.name: (body.figure, pin.SE3(np.eye(3), np.array((0.0, aside[name], 0.0))) * body.at)
+            for name, those in bodies.items()
+            for body in those
         }
     )
-    for name in clips:
+    for name, those in bodies.items():
         for each in scene.objects.values():
             if each.segment is not None:
-                to, rests = f"{_figure(name)}/{each.segment}", [f"{_figure(name)}/{one}" for one in each.rests_on]
-                rests = [one for one in rests if one in world.figure.segments]
-                label = f"{each.name} of {name}"
+                # several figures of a clip may touch what one of them carries
+                renamed = {one: _renamed(one, those) for one in (each.segment, *each.rests_on)}
+                rests = [renamed[one] for one in each.rests_on if renamed[one] in world.figure.segments]
+                label, to = f"{each.name} of {name}", renamed[each.segment]
                 world.attach(each.shape, to=to, name=label, at=each.placement, rests_on=rests, color=each.color)
         for each in around:
             if not isinstance(each.shape, HalfSpace):
@@ -121,18 +154,21 @@ def _figure(name: str) -> str:
     return name.replace("/", " ")
 
 
-def _way(clip: Clip) -> Array:
-    """(3,) metres that a clip goes along each axis."""
-    return np.asarray(np.ptp(clip.q[:, :3], axis=0)) if clip.figure.root == "free" else np.zeros(3)
+def _bodies(name: str, clip: Clip) -> list[_Body]:
+    """The figures of a clip, with names in the scene of all motions."""
+    figure = clip.figure
+    if figure.root != "several":
+        return [_Body(_figure(name), figure, pin.SE3.Identity(), clip.q, "")]
+    return [
+        _Body(f"{_figure(name)} {member}", clip.part(member).figure, at, figure.part(member, clip.q), f"{member}/")
+        for member, (_, at) in figure.members.items()
+    ]
 
 
-def _middle(clip: Clip) -> Array:
-    """(3,) about which a clip is: its root's way, or the joints of what stands on a fixed base."""
-    if clip.figure.root == "free":
-        return np.asarray(clip.q[:, :3].mean(axis=0))
-    data = clip.figure.model.createData()
-    pin.forwardKinematics(clip.figure.model, data, clip.q[0])
-    return np.asarray(np.mean([at.translation for at in data.oMi], axis=0))
+def _renamed(segment: str, bodies: Sequence[_Body]) -> str:
+    """The name in the scene of all motions of a segment of a clip's figures."""
+    body = next(body for body in bodies if segment.startswith(body.prefix))
+    return f"{body.name}/{segment.removeprefix(body.prefix)}"
 
 
 def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list[pin.SE3]]:

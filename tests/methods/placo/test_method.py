@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.answers import honest
 from wholebody.base.errors import InputError
+from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.methods.placo.robot import Robot
 
 pytest.importorskip("placo", reason="placo is not installed (the extra placo)")
@@ -205,19 +206,33 @@ def test_two_free_roots_move_or_are_frozen() -> None:
     assert figure.part("ben", one.q)[:7] == pytest.approx(figure.part("ben", start)[:7], abs=1e-12)
 
 
-def test_the_balance_of_one_of_two_people_is_left_to_the_assessment_or_refused(human: wb.Figure) -> None:
-    pair = wb.Scene({"anna": human, "ben": (human, (1.2, 0.3, 0.0))})
-    held = [wb.Hold("anna/left_foot"), wb.Hold("anna/right_foot")]
-    problem = wb.Problem(pair, goals=[wb.Point("anna/right_palm", (0.5, -0.2, 1.1))], constraints=held)
-    assert any(isinstance(term, wb.Balance) for term in problem.defaults)
+def test_each_of_two_people_keeps_balance_and_a_centre_of_mass_of_one_is_refused(human: wb.Figure) -> None:
+    pair = wb.Scene({"anna": human, "ben": (human, (1.5, 0.3, 0.0))}).add(wb.HalfSpace(), name="floor")
+    held = [wb.Hold(f"{name}/{side}_foot") for name in ("anna", "ben") for side in ("left", "right")]
+    # too far in front and to the side for a person who only stretches an arm
+    goals = [wb.Point("anna/right_palm", (0.6, -0.4, 0.9)), wb.Point("ben/right_palm", (2.1, -0.1, 0.9))]
+    problem = wb.Problem(pair, goals=goals, constraints=held)
+    for kind in ("hard", "soft"):
+        solution = wb.solve(problem, wb.methods.Placo(holds=kind))
+        assert solution.solved, solution.message
+        honest(problem, solution)
+        for name in ("anna", "ben"):
+            alone, q = wb.Scene(human), pair.figure.part(name, solution.q)
+            balance = wb.Balance().resolve(alone, pair.figure.part(name, problem.start))
+            assert balance.value(alone.state(q)).min() > 0.03
+    loose = wb.solve(wb.Problem(pair, goals=goals, constraints=held, balance=False), "placo")
+    assert loose.solved
+    assert wb.assess(problem, loose.q).constraint_violation > 0.01  # so balance was no matter of course
+    message = wb.methods.Placo().accepts(wb.Problem(pair, goals=[wb.CenterOfMass((1.2, 0.3, 1.0), figure="ben")]))
+    assert message is not None
+    assert "CenterOfMass (placo" in message
+    of_both = wb.CenterOfMass((0.6, 0.15, 0.0), axes="xy")
+    assert wb.methods.Placo().accepts(wb.Problem(pair, goals=[of_both], balance=False)) is None
+
+
+def test_a_program_without_a_solution_is_solved_again_with_soft_holds() -> None:
+    """Straight legs: placo finds no step of hard feet that restores what the first one turned."""
+    problem, _ = SETS["balance"].pose(1, np.random.default_rng([11, 1]))
     solution = wb.solve(problem, "placo")
     assert solution.solved, solution.message
     honest(problem, solution)
-    feet_of_ben = wb.Balance(("ben/left_foot", "ben/right_foot"))
-    for terms in ({"constraints": [feet_of_ben]}, {"goals": [wb.CenterOfMass((1.2, 0.3, 1.0), figure="ben")]}):
-        kind = "Balance" if "constraints" in terms else "CenterOfMass"
-        message = wb.methods.Placo().accepts(wb.Problem(pair, **terms))
-        assert message is not None
-        assert f"{kind} (placo" in message
-    of_both = wb.CenterOfMass((0.6, 0.15, 0.0), axes="xy")
-    assert wb.methods.Placo().accepts(wb.Problem(pair, goals=[of_both], balance=False)) is None

@@ -268,9 +268,13 @@ class Guard:
         return all(part.inside() for part in self.parts)
 
     def _remember(self) -> bool:
+        """Whether all parts are inside, which the nodes' values alone decide; the last ones inside are kept."""
+        values = self._limbs.values[self._rows]
+        if self._last is not None and bool((values == self._last).all()):
+            return True
         if not self._inside():
             return False
-        self._last = self._limbs.values[self._rows]
+        self._last = values
         return True
 
     def _retreat(self, last: Array) -> None:

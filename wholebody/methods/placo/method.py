@@ -9,6 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
+from wholebody.figures.state import State
 from wholebody.geometry.flesh import settled
 from wholebody.methods.base import Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.methods.conclusion import Descends, Ending
@@ -29,15 +30,14 @@ HOLDS = {"hard": 0.0, "soft": 100.0}
 class Placo(Checked, Descends):
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
-    Goals are soft tasks and holds hard ones. Joint limits and placo's self-collision constraint, whose model includes
-    the objects, are hard too. The measures are joints tasks with decreasing weight. An iteration is one of its
-    programs.
+    Goals are soft tasks and holds hard ones; a program without a solution is solved again with soft holds. Joint
+    limits and placo's self-collision constraint, whose model includes the objects, are hard too. The measures are
+    joints tasks with decreasing weight. An iteration is one of its programs.
 
     Takes Point, Frame, Orientation, Axis(direction=...), CenterOfMass, Posture and Relative goals; Hold, Plane with
-    side "on", Balance and Freeze; Effort and Displacement. All other terms are refused by name, and Balance and
-    CenterOfMass of one figure among several; the balance that each person keeps by default there is left to the
-    assessment. There is one start. If placo finds no solution of a program, the answer is the posture before it, and
-    the message quotes placo.
+    side "on", Balance and Freeze; Effort and Displacement. All other terms are refused by name, and CenterOfMass of one
+    figure among several. There is one start. If placo finds no solution of a program, the answer is the posture before
+    it, and the message quotes placo.
 
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
@@ -114,13 +114,13 @@ class _Programs:
     def __init__(self, problem: Problem, robot: Robot, tolerance: float, holding: float) -> None:
         import placo
 
-        self._robot = robot
+        self._robot, self._state = robot, State(problem.scene.model)
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
         robot.couple(self._solver)
-        self._tasks = add_terms(self._solver, robot, problem, holding)
+        self._tasks, self._holding = add_terms(self._solver, robot, problem), holding
         self._regular = self._solver.add_regularization_task(REGULAR * MEASURES)
         self._solver.dt = 1.0
-        robot.wrapper.set_velocity_limits(STEP)
+        robot.limit_steps(STEP)
         self._solver.enable_joint_limits(True)
         self._solver.enable_velocity_limits(True)
         apart = self._solver.add_avoid_self_collisions_constraint()
@@ -132,9 +132,17 @@ class _Programs:
 
     def step(self, q: Array, weight: float, damping: float) -> Array:
         """Displacement (nv,) by one program; see `wholebody.methods.differential.Stepper`."""
-        self._tasks.weigh(weight)
+        self._tasks.move(self._state.update(q), weight)
         self._regular.set_weight(damping)
-        self._robot.move(q)
+        try:
+            return self._solved(self._holding)
+        except StepError:
+            if self._holding:
+                raise
+            return self._solved(HOLDS["soft"])
+
+    def _solved(self, holding: float) -> Array:
+        self._tasks.hold(holding)
         try:
             with TOOL:
                 theirs = self._solver.solve(False)

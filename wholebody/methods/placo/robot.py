@@ -104,6 +104,26 @@ class Robot:
         """Our displacement (nv,) from placo's."""
         return np.asarray(theirs, dtype=float)[self._idx_v]
 
+    def half_spaces(self, rows: Array, room: Array) -> tuple[Array, Array]:
+        """Rows (k, placo's nq) and bounds (k,) on placo's joints of ``rows (k, nv) @ our displacement >= -room (k,)``.
+
+        Placo's base is left out, which with several figures nothing moves.
+        """
+        model = self.wrapper.model
+        theirs = np.zeros((len(rows), model.nq))
+        ahead = model.nq - model.nv  # of the base's quaternion
+        theirs[:, self._idx_v + ahead] = -rows
+        return theirs, theirs @ self.wrapper.state.q + room
+
+    def limit_steps(self, longest: float) -> None:
+        """Limit what one program moves a joint by [rad, m]; free roots have no limit, as placo's base has none."""
+        self.wrapper.set_velocity_limits(longest)
+        model, free = self.wrapper.model, self.wrapper.model.velocityLimit.copy()
+        for joint in self._roots:
+            for name in self.joint_names(joint):
+                free[model.joints[self._id(name)].idx_v] = ENDLESS
+        model.velocityLimit = free
+
     def joint_name(self, joint: int) -> str:
         """Name in placo of a joint of our model that has one axis."""
         return f"j{joint:05d}"

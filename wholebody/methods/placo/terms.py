@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from wholebody import tasks
 from wholebody.base.arrays import Array
+from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError, named_terms
 from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
@@ -20,7 +21,6 @@ Frames = dict[str, tuple[int, pin.SE3]]
 
 REASONS = {
     "Axis": "placo aligns an axis with a direction, not with a place",
-    "Balance": "placo's centre of mass is of all figures together",
     "CenterOfMass": "placo's is of all figures together",
     "Plane": "placo has no half-spaces for frames",
     "ReachCones": "placo's cones are circular",
@@ -31,15 +31,31 @@ REASONS = {
 
 @dataclass
 class Tasks:
-    """The tasks whose weight changes while the solver runs."""
+    """The tasks that change while the solver runs."""
 
+    robot: Robot
     # the tasks of the measures, with the share of the weight of each
     measures: list[tuple[Any, float]] = field(default_factory=list)
+    # tasks of holds, with how many weights each has, and their names
+    holds: list[tuple[Any, int, str]] = field(default_factory=list)
+    # half-spaces of joints, with the balance of one figure among several that they stand for to first order
+    balances: list[tuple[Any, tasks.Balance]] = field(default_factory=list)
 
-    def weigh(self, weight: float) -> None:
-        """Set the weight of the measures against the goals."""
+    def move(self, state: State, weight: float) -> None:
+        """Take the robot to a posture, and set the weight of the measures against the goals."""
+        self.robot.move(state.q)
         for number, (task, share) in enumerate(self.measures):
             task.configure(f"measure {number}", "soft", weight * share)
+        for half_spaces, term in self.balances:
+            rows, room = self.robot.half_spaces(
+                state.dense_jacobian(term.jacobian(state)), np.asarray(term.value(state)) - term.lower
+            )
+            half_spaces.A, half_spaces.b = rows, room
+
+    def hold(self, weight: float) -> None:
+        """Make holds soft with a weight, or hard with 0."""
+        for task, weights, name in self.holds:
+            task.configure(name, "soft" if weight else "hard", *[weight or 1.0] * weights)
 
 
 def check_terms(problem: Problem) -> None:
@@ -55,15 +71,15 @@ def check_terms(problem: Problem) -> None:
 
 
 def _takes(problem: Problem, term: object) -> bool:
-    if isinstance(term, (tasks.Balance, tasks.CenterOfMass)):
+    if isinstance(term, tasks.CenterOfMass):
         return _of_all(problem, term)
     if isinstance(term, tasks.Axis):
         return term.toward is None
     if isinstance(term, tasks.Plane):
         return term.side == "on"
     kinds = (
-        tasks.Point, tasks.Frame, tasks.Orientation, tasks.Posture, tasks.Relative, tasks.Hold, tasks.Freeze,
-        tasks.StepLimit, tasks.Effort, tasks.Displacement,
+        tasks.Point, tasks.Frame, tasks.Orientation, tasks.Posture, tasks.Relative, tasks.Hold, tasks.Balance,
+        tasks.Freeze, tasks.StepLimit, tasks.Effort, tasks.Displacement,
     )  # fmt: skip
     return isinstance(term, kinds)
 
@@ -100,14 +116,20 @@ def _name(place: Place, offset: Array | None = None) -> str:
     return f"f{place.frame:05d} at {' '.join(repr(value) for value in offset.tolist())}"
 
 
-def add_terms(solver: Any, robot: Robot, problem: Problem, holding: float) -> Tasks:
-    """Add goals to placo's solver as soft tasks, constraints as hard ones, and measures; `holding`: of soft holds."""
-    own = Tasks()
+def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
+    """Add goals to placo's solver as soft tasks, constraints as hard ones, and measures."""
+    own = Tasks(robot)
     for number, goal in enumerate(problem.goals):
         _goal(solver, robot, problem, f"goal {number}", goal)
     for number, term in enumerate(problem.constraints):
-        if not isinstance(term, tasks.Balance) or _of_all(problem, term):  # others are defaults
-            _constraint(solver, f"constraint {number}", term, holding)
+        if isinstance(term, tasks.Balance) and not _of_all(problem, term):
+            none = np.zeros((0, robot.wrapper.model.nq))
+            own.balances.append((solver.add_joint_space_half_spaces_constraint(none, np.zeros(0)), term))
+            own.balances[-1][0].configure(f"constraint {number}", "hard", 1.0)
+        elif isinstance(term, tasks.Hold):
+            own.holds.append((*_placement(solver, term.residual), f"constraint {number}"))
+        else:
+            _constraint(solver, f"constraint {number}", term)
     for bound in problem.bounds:
         if isinstance(bound, tasks.Freeze):  # a solve has no time step, so a step limit bounds nothing
             _freeze(solver, robot, problem, bound)
@@ -124,7 +146,8 @@ def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> 
         _posture(solver, robot, problem, name, goal)
         return
     if isinstance(goal, (tasks.Frame, tasks.Orientation, tasks.Relative)):
-        _placement(solver, name, goal.residual, "soft", goal.weight)
+        task, weights = _placement(solver, goal.residual)
+        task.configure(name, "soft", *[goal.weight] * weights)
         return
     if isinstance(goal, tasks.Point):
         task = solver.add_position_task(_name(goal.place, goal.resolved_offset), np.array(goal.resolved_target))
@@ -152,10 +175,8 @@ def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: tasks
             task.configure(f"{name}, {root}", "soft", goal.weight, goal.weight)
 
 
-def _constraint(solver: Any, name: str, term: Any, holding: float) -> None:
-    if isinstance(term, tasks.Hold):
-        _placement(solver, name, term.residual, "soft" if holding else "hard", holding or 1.0)
-    elif isinstance(term, tasks.Plane):
+def _constraint(solver: Any, name: str, term: Any) -> None:
+    if isinstance(term, tasks.Plane):
         task = solver.add_position_task(_name(term.place), term.height * np.array(term.resolved_normal))
         across = np.linalg.svd(term.resolved_normal[None])[2]  # rows: the normal, and two directions in the plane
         task.mask.R_custom_world = np.array([across[1], across[2], term.resolved_normal])
@@ -167,20 +188,19 @@ def _constraint(solver: Any, name: str, term: Any, holding: float) -> None:
         constraint.configure(name, "hard", 1.0)
 
 
-def _placement(solver: Any, name: str, residual: PlacementResidual, priority: str, weight: float) -> None:
-    """The residual of one frame in another, or in the world."""
-    target, names = residual.placement, [_name(residual.place)]
+def _placement(solver: Any, residual: PlacementResidual) -> tuple[Any, int]:
+    """A task for the residual of one frame in another, or in the world, and how many weights it has."""
+    target, names, weights = residual.placement, [_name(residual.place)], 1
     if residual.base.frame:
         names.insert(0, _name(residual.base))
-    weights = [weight]
     if residual.position and residual.orientation:
-        kind, wanted, weights = "frame", target.homogeneous, [weight, weight]
+        kind, wanted, weights = "frame", target.homogeneous, 2
     elif residual.position:
         kind, wanted = "position", target.translation
     else:
         kind, wanted = "orientation", target.rotation
     relative = "relative_" if residual.base.frame else ""
-    getattr(solver, f"add_{relative}{kind}_task")(*names, wanted).configure(name, priority, *weights)
+    return getattr(solver, f"add_{relative}{kind}_task")(*names, wanted), weights
 
 
 def _freeze(solver: Any, robot: Robot, problem: Problem, bound: tasks.Freeze) -> None:

@@ -22,7 +22,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import load
 from wholebody.geometry.placement import steady
 from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
-from wholebody.motion.files.base import Frames, Motion
+from wholebody.motion.files.base import Frames, Motion, check_one
 
 VERSION = 1  # of the layout of the arrays
 APART = 1e-3  # m: joints of one figure are as far from each other, but for what another version makes of a person
@@ -173,6 +173,7 @@ def _things(path: Path, arrays: dict[str, NDArray[np.generic]], frames: int) -> 
 
 
 def _check_joints(path: Path, joints: list[str], figure: Figure) -> None:
+    check_one(joints, figure, f"{path.name}: the clip")
     for joint in joints:
         if joint not in figure.joints:
             raise UnknownNameError("joint", joint, figure.joints, path.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
+from wholebody.figures.figure import Figure
 from wholebody.motion.clip import LARGEST, MOST_FRAMES
 
 Motion: TypeAlias = Any
@@ -24,6 +25,19 @@ class Frames(NamedTuple):
     dt: float  # seconds from frame to frame
     name: str  # name of the clip
     things: Mapping[str, Array] = {}  # placements (n, 7) of what moves beside the figure
+
+
+def check_one(names: Iterable[str], figure: Figure, what: str) -> None:
+    """Refuse names of a motion of several figures, such as "anna/left_elbow_flexion", where one figure is meant."""
+    own = {*figure.frames, *figure.segments, *figure.joints}
+    split = [each.rpartition("/") for each in names]
+    several = dict.fromkeys(before.split()[-1] for before, _, name in split if before.strip() and name in own)
+    if several and figure.root != "several" and not any(name in own for before, _, name in split if not before):
+        listed = ", ".join(one_line(name, 20) for name in several)
+        raise FileFormatError(
+            f"{what} is of figures that are called {listed}; give the figure of their scene, scene.figure, or in a "
+            "command its task file, --scene"
+        )
 
 
 LARGEST_FILE = 500_000_000  # bytes of a text file of motion: an hour of 75 joints at 120 frames a second

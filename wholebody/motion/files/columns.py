@@ -18,7 +18,7 @@ from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import LARGEST
-from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
+from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, check_one
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
 LATEST = 1e9  # s
@@ -122,6 +122,7 @@ def _values(path: Path, figure: Figure, columns: Mapping[str, str], degrees: boo
     first = [own.get(name, name) for name in given]
     if first and all(map(is_number, first)):
         first, lines = _without_names(path, first, wanted, [(number, first), *lines])
+    check_one(given, figure, f"{path.name}: the table")
     names = _columns(f"{path.name}, line {number}", first, wanted)
     table, places, decimals = _numbers(path, number, lines, names)
     given = given if len(given) == len(names) else names  # a file without names has no time either
