@@ -74,10 +74,7 @@ class AllPairs:
             self.least = float(self._found[:, 0].min(initial=np.inf))
 
     def shortfalls(self, q: Array, clearances: Array) -> tuple[Array, Array, Array]:
-        """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq), for clearances (k, pairs).
-
-        These are as in `move` and `ask`; coal is asked only for pairs that neither balls nor boxes separate.
-        """
+        """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq) for clearances (k, pairs)."""
         table, distances, depth, short = self._built.table, self._distances, *np.zeros((2, len(q)))
         joints = np.empty((len(q), self._built.model.njoints, 4, 3))
         placed = np.empty((len(q), *distances.placed.shape))

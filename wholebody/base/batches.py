@@ -208,11 +208,7 @@ def _client(address: str) -> AbstractContextManager[Any]:
         raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
 
     class Closed(Client):  # type: ignore[misc]
-        """A client that closes itself where it cannot start.
-
-        Left to the garbage collector, one whose address is wrong closes itself in any thread at any time: in that of
-        the next client's loop it blocks the start of that client, and at the end of Python it waits for 20 s.
-        """
+        """A client that closes itself where it cannot start: else it would block the start of the next one."""
 
         def start(self, **options: Any) -> None:
             try:

@@ -200,10 +200,7 @@ def listed(value: object, what: str, example: str) -> list[Any]:
 
 
 class FixedAttributes:
-    """Base of objects whose public attributes are decided when they are made.
-
-    Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks.
-    """
+    """Base of objects whose public attributes stay, but those in `_settable`, which `_checked_value` checks."""
 
     _settable: ClassVar[frozenset[str]] = frozenset()
     _correction: ClassVar[str] = "make another one"

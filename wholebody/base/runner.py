@@ -70,10 +70,7 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The outcome of a job: the notes that it sent before its answer, and what the function returned.
-
-    Where the process ended, there is no answer, and `error` says how.
-    """
+    """A job's outcome: notes that it sent, and what the function returned or, where its process ended, the `error`."""
 
     job: Job
     notes: tuple[Any, ...]

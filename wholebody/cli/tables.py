@@ -24,10 +24,7 @@ def console(least: int = 0) -> Console:
 
 @contextmanager
 def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], Any]]:
-    """Show on a terminal how far something is: the function takes how much of `count` is done, and what it is.
-
-    The line goes when it is done.
-    """
+    """Show on a terminal how much of `count` is done, and what, by the function that it yields."""
     line, shown = Line(), sys.stderr is not None and sys.stderr.isatty()
     if shown:
         line.write(0, count, what)

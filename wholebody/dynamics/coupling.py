@@ -365,10 +365,7 @@ def drift(
 
 
 def share_below(energies: tuple[float, float, float], most: float) -> float:
-    """The largest share from 0 to 1 of an impulse with which an energy is at most `most`, J.
-
-    The energy is quadratic in the share; `energies` are those with none, half and all of it.
-    """
+    """Largest share of an impulse with an energy of at most `most` [J]; `energies`: of none, half and all."""
     none, half, full = energies
     square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
     if full <= most or square <= 0.0:

@@ -240,10 +240,7 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """The start of the next program, without impulses that would grow without bound.
-
-        Those are of bodies that are pushed together, and of what yields: its motion changes by them after the step.
-        """
+        """The start of the next program, without impulses of pushed bodies and of what yields, which would grow."""
         grow = self._jammed | self._yielding[self.points.bodies].any(axis=1)
         kept, count = np.flatnonzero(self._bearing() & ~grow), len(self.points.gap)
         return Impulses(

@@ -89,10 +89,7 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
 
 
 def cached_entry(key: str, make: Callable[[], Any]) -> Any:
-    """What a function makes, from the cache, or made and cached, by the hexadecimal digest of what it is made from.
-
-    That is arrays, texts, numbers and None, and tuples and lists of these, which all come back as tuples.
-    """
+    """What a function makes of arrays, texts, numbers, None and tuples of these, cached by its digest."""
     global _writes
     path = cache_folder() / f"{key}{_SUFFIX}"
     found = _read(path)

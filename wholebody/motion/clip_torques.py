@@ -276,10 +276,7 @@ def bearing(
 
 
 def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tuple[str, ...], list[Touches]]:
-    """Segments other than feet that touch things of a scene, and where they do in each frame.
-
-    Things that move in the clip bear nothing: what they weigh is not known.
-    """
+    """Segments other than feet that touch things of a scene that stand, and where they do in each frame."""
     figure, owners, slow = clip.figure, scene.piece_owner, RestLimits().speed
     model, data = figure.model, figure.model.createData()
     carrier = {name: name for name in figure.segments}

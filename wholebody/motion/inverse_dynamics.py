@@ -38,10 +38,7 @@ class GroundForces(NamedTuple):
 def ground_forces(
     wrench: Array, about: Array, points: Array, friction: float, axes: Array | None = None
 ) -> GroundForces:
-    """Forces at points (p, 3), within cones of friction about axes (p, 3), that give a wrench (6,) as nearly.
-
-    The wrench is about a point (3,); without axes the cones point up.
-    """
+    """Forces at points (p, 3) in cones about axes (p, 3), or up, nearest to a wrench (6,) about a point (3,)."""
     # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))

@@ -148,10 +148,7 @@ def _method(time_limit: float | None, ends: float) -> QP:
 
 
 def _settled(problem: Problem, answer: Solution, time_limit: float | None, ends: float) -> Solution:
-    """The end of descents from an answer and from their ends in turn, until one stays where it begins.
-
-    Where neighbours of an answer meet the goals, a descent can end beside a maximum of the measures among them.
-    """
+    """The end of descents from an answer and from their ends in turn, until one stays where it begins."""
     for _ in range(SETTLING):
         after = next(_method(time_limit, ends).minima(problem, [answer.q]))
         if not after.solved or _difference(problem.scene.model, after.q, answer.q) < STAYED:

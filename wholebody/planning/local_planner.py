@@ -138,10 +138,7 @@ class Geodesics:
         return list(path[1:])
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
-        """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked.
-
-        Those that it has no time for stay as they are and count as blocked.
-        """
+        """Postures (n, nq) near a path that keep constraints, and which motions between are blocked, or had no time."""
         blocked, seen = np.ones(len(path) - 1, dtype=bool), self._seen(path[0])
         for k, pair in enumerate(pairwise(path)):
             if BUDGET.over:
@@ -251,10 +248,7 @@ class TrackedMotions:
         return self._approached(q, target, np.ones(self._model.nv), most)
 
     def pulled(self, q: Array, target: Array) -> list[Array]:
-        """Postures (nq,) of a motion from q that pulls free roots to their places in a target (nq,), without q.
-
-        All else gives way to what is around it, as a hand that is drawn out of a box does.
-        """
+        """Postures (nq,) from q, without it, that pull free roots to a target's places; all else gives way."""
         return self._approached(q, target, self._loose, np.inf)[0]
 
     def _approached(self, q: Array, target: Array, factors: Array, most: float) -> tuple[list[Array], bool]:

@@ -307,10 +307,7 @@ class _Search:
         return None, trees
 
     def _led(self, end: Array) -> list[Array]:
-        """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.
-
-        Most narrow places are around ends, and steps towards the start lead out of them.
-        """
+        """Postures from the start to an end (nq,) without trees, if any: straight, or from the end back."""
         start = self._problem.start
         way, self._straight = self._local.towards(start, end)
         if self._straight:

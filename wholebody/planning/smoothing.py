@@ -160,10 +160,7 @@ def _unwrapped(motions: Array) -> Array:
 
 
 def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
-    """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free.
-
-    It is the free path where the time for it ends before.
-    """
+    """A path (n, nq) filtered by a Gaussian, less so where that is not free; the path itself where time ends before."""
     free = places(model, path)
     wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path.copy()
     blocked, anew = np.zeros(len(path) - 1, dtype=bool), np.ones(len(path), dtype=bool)

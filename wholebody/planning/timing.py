@@ -103,10 +103,7 @@ def used(figure: Figure, q: Array, pace: Pace) -> Use:
 
 
 def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Array) -> Array:
-    """(m,) largest squares of the rate of s at each point, 0 at both ends, within velocities and accelerations (nv,).
-
-    `first` and `second` (m, nv) are the derivatives of the path with respect to s, whose points are 1 apart.
-    """
+    """(m,) largest squared rates within velocities and accelerations (nv,); `first`, `second` (m, nv)."""
     count = len(first)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         most = np.where(first != 0.0, velocity / np.abs(first), np.inf).min(axis=1, initial=np.inf) ** 2

@@ -160,10 +160,7 @@ class Workspace(NotCopyable):
         return self.proximity.query_views(self.state.update(q).data, within)
 
     def largest_approach(self, most: Array) -> Array:
-        """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
-
-        Things that are carried may be placed anew at any time; nothing is known of them.
-        """
+        """Most (pairs,) that distances can fall while freedoms move by at most `most` (nv,); inf of carried things."""
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in self.geometry.geometryObjects])
         for pieces in self._built.pieces_of.values():
             centres[[index for index, _ in pieces]] = np.inf

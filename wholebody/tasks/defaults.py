@@ -37,10 +37,7 @@ def usual_measures(
     scene: Scene, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound],
     stands: Sequence[str], *, ranges: bool,
 ) -> tuple[Measure, ...]:  # fmt: skip
-    """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known.
-
-    `stands` are the persons of `standing`.
-    """
+    """The measures of a problem that states none, for its resolved terms and persons of `standing`; once a scene."""
     if not scene.figure.ranges:  # no person; to look it up by its start takes longer
         return (_effort.resolve(scene, start),)
     feet, sits = stances(scene, start, terms), seated(scene, terms)
@@ -191,10 +188,7 @@ def usual_constraints(
     scene: Scene, start: Array, stated: Sequence[Constraint], stands: Sequence[str], *, ranges: bool,
     balance: bool | None,
 ) -> tuple[tuple[Constraint, ...], str]:  # fmt: skip
-    """The constraints that are added to resolved ones; the same ones of the same scene are known.
-
-    `stands` are the persons of `standing`, `ranges` and `balance` are as a problem takes them.
-    """
+    """The constraints added to resolved ones, once a scene; `ranges` and `balance` as a problem takes them."""
     if not (scene.figure.ranges or balance):
         return (), ""  # no person
     known = frozenset(map(type, stated))

@@ -92,10 +92,7 @@ def point_rows(state: State, point: Array, joint: int) -> Array:
 def pressure(
     state: State, loads: Loads, mass: range | None, height: float, rises: Array | float = 0.0
 ) -> tuple[Array, Array]:
-    """The point (2,) about which weight and forces have no moment but a vertical one, and its derivative.
-
-    It is at a height [m], whose derivative (nv,) is `rises`.
-    """
+    """The point (2,) of no moment but a vertical one, at a height [m] that `rises` (nv,), and its derivative."""
     model = state.model
     weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))
     center, moved = state.center_of_mass(mass)[:2], state.center_of_mass_jacobian(mass)[:2]

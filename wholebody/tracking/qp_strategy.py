@@ -27,10 +27,7 @@ CLEARANCE = 1e-3
 
 
 class Attraction(DistanceMeasure):
-    """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
-
-    Without contact one program reaches its minimum. A goal would be met at any cost in the other joints.
-    """
+    """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there."""
 
     def __init__(self, q: Array, weights: Array) -> None:
         """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""

@@ -138,10 +138,7 @@ class DrawnFigure(NamedTuple):
 
 
 class Bodies:
-    """All pieces of a scene in the scene graph, in the order of its geometry model.
-
-    `see_through` names things to draw transparent; `pieces` draws a figure's pieces even if it has a surface.
-    """
+    """The pieces of a scene in the scene graph, in order; some `see_through`, a figure's own with `pieces`."""
 
     def __init__(self, scene: ViewedScene, see_through: Collection[str], pieces: bool) -> None:
         self.scene = scene

@@ -31,10 +31,7 @@ class Op:
 
 
 class Command(NamedTuple):
-    """One message to the page: its kind, node and key, and its bytes (msgpack).
-
-    An ANIMATION with the key STOP is sent to open pages and not stored.
-    """
+    """A message to the page: kind, node, key, and msgpack bytes; an ANIMATION with key STOP is sent and not stored."""
 
     op: bytes
     path: str = ""

@@ -33,10 +33,7 @@ class Colored:
 
 
 class ViewedAssembly:
-    """The bodies and things that an assembly has now, and its `figures`, each with the color that it was given.
-
-    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
-    """
+    """Bodies with shapes and things of an assembly, and its `figures`; a posture is `assembly.q` or a row of a path."""
 
     figure: Any = None
     revision = 0

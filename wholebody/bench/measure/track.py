@@ -33,11 +33,7 @@ SETTING = given.told
 
 @dataclass(frozen=True)
 class Track:
-    """One reach, the same for every tool.
-
-    `start` (nq,); `targets` (steps, 3) of the frame `tip` [m]; `feet` stay where they are; every pair keeps `clearance`
-    [m].
-    """
+    """One reach: `start` (nq,), `targets` (steps, 3) of `tip` [m], feet that stay, a `clearance` [m] of pairs."""
 
     name: str
     scene: wb.Scene

@@ -64,10 +64,7 @@ def hand_surface(person: Person, side: str) -> Surface:
 
 
 def halfway(first: Array, second: Array, slide: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-    """The placement (4, 4) of a half bone, whose rotation is half way from the first's to the second's.
-
-    It is at the second's origin but for its `slide` (3,) times 1 - cosine of the angle between the two z axes.
-    """
+    """Placement (4, 4) of a half bone at the second's origin + `slide` (3,) (1 - cosine of the z axes)."""
     turn = pin.log3(first[:3, :3].T @ second[:3, :3])
     found = np.array(second)
     found[:3, :3] = first[:3, :3] @ pin.exp3(0.5 * turn)

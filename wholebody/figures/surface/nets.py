@@ -58,10 +58,7 @@ def triangles(field: Field, low: Array, high: Array, cell: float, cuts: Sequence
 
 
 def coarsened(surface: Triangles) -> NDArray[np.int64]:
-    """Return fewer and larger triangles (m, 3) between the vertices of a closed surface; it stays closed.
-
-    Vertex clustering: Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993.
-    """
+    """Return fewer triangles (m, 3) of a closed surface, which stays closed (Rossignac and Borrel 1993)."""
     vertices, faces = surface.vertices, surface.faces
     edges = vertices[faces] - vertices[np.roll(faces, 1, axis=1)]
     # 2 saves no more time and loses eyes and lips.

@@ -64,10 +64,7 @@ def _contains(outer: Field, solid: Solid) -> bool:
 
 
 def limb(balls: Sequence[tuple[Array, float]], smoothing: float = SMOOTHING) -> Field:
-    """A smooth solid around balls in a row, centres (3,) and radii: middle line and radius run evenly along them.
-
-    `smoothing` is the standard deviation along them, metres: cloth spans the hollows between muscles.
-    """
+    """A smooth solid around balls, centres (3,) and radii, smoothed by `smoothing` along them [m]."""
     centers, radii = np.array([center for center, _ in balls]), np.array([radius for _, radius in balls])
     start, span = centers[0], centers[-1] - centers[0]
     length = float(np.linalg.norm(span))

@@ -16,10 +16,7 @@ def far_moved(
     before: Array, after: Array, table: tuple[Indices, Array, Array],
     near: tuple[Indices, Array, float, Indices, Array, float],
 ) -> Indices:  # fmt: skip
-    """Return the pairs (k,) that moved against each other by more than their distance; placements are (n, 4, 3).
-
-    `table`: `pairs`, `widths` and `reach` of the pair table; `near`: near pairs, distances, query distance, twice.
-    """
+    """Pairs (k,) that moved by more than their distance; placements (n, 4, 3), `near` pairs, distances."""
     pairs, widths, reach = table
     number_before, distance_before, within_before, number_after, distance_after, within_after = near
     count = len(before)

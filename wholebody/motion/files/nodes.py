@@ -62,10 +62,7 @@ class Node:
 
 
 def nodes_of(figure: Figure) -> list[Node]:
-    """The nodes of a figure, parents before children; a figure whose joints slide has none.
-
-    Those of figures that were joined hang on a node "world".
-    """
+    """The nodes of a figure, parents first; none where joints slide. Joined figures hang on a node "world"."""
     model = figure.model
     data = model.createData()
     columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)

@@ -158,10 +158,7 @@ class Trajectory(Checked):
 def _in_parts(
     run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, report: Callable[[float], bool]
 ) -> WindowResult:
-    """A window freed part by part, each from where the one before it is; with that one where a part is not freed.
-
-    What is missed by little stays, for the repair; where nothing comes before, all is freed at once.
-    """
+    """A window freed part by part, each from the one before, or with it where it is not freed."""
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
     q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()  # of each part
 

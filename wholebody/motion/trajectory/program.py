@@ -42,10 +42,7 @@ class Limits(NamedTuple):
         cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None,
         begun: Array | None = None,
     ) -> Limits:  # fmt: skip
-        """Those of a chart of a clip's frames from `first` on; at a seam nothing moves from what is begun with (n, nv).
-
-        `seams` say whether the clip goes on before and after them, `rate` is the factor of speed limits, None for none.
-        """
+        """Those of a chart from frame `first` on, begun with (n, nv); `seams` as ends, `rate` of speed limits."""
         count, nv = len(chart), chart.model.nv
         lower, upper = np.full((count, nv), -np.inf), np.full((count, nv), np.inf)
         slowest, fastest = lower[1:].copy(), upper[1:].copy()

@@ -104,10 +104,7 @@ def timing(b: Array, dt: float) -> Timing | None:
 
 
 def passed(b: Array, step: float) -> tuple[Array, float]:
-    """Places s (m,) from 0 to n - 1 at equal times, of squares of the rate ds/dt at whole s (n,), linear in between.
-
-    Times are `step` apart, or less for the last one to be at the end: also returns step / this difference.
-    """
+    """Places (m,) in n frames at equal times, of squared rates (n,), and step / their difference."""
     rate = np.sqrt(b)
     begun = np.concatenate([[0.0], np.cumsum(2.0 / (rate[:-1] + rate[1:]))])
     count = max(1, int(np.ceil(begun[-1] / step - 1e-9)))

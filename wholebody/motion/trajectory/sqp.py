@@ -155,10 +155,7 @@ class WindowProgram:
         self, x: Array, cancel: Cancel, radius: float | None = None, largest: float | None = None,
         early: bool = False,
     ) -> SQPResult:  # fmt: skip
-        """Iterate from deviations x (n, nv), in trust regions from `radius` to `largest`.
-
-        `early` ends where much is missed after ten steps, as there are other beginnings.
-        """
+        """Iterate from x (n, nv) in trust regions; `early` ends where ten steps leave much missed."""
         here, filter_, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         counts, smallest = self._counts(here), 0.5 * filter_.radius

@@ -118,10 +118,7 @@ class ClipRun:
         self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
         loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
-        """Take postures (n, nq) that deviations are from, and what a push spreads over [s] or None, by its jerk.
-
-        `rate` is the factor of speed limits, None for none; `near` the trust region of windows with given postures.
-        """
+        """Take postures (n, nq), the spread of a push [s] or None, the `rate` of speeds, a trust region `near`."""
         self._run, self._reference = run, reference
         self._time, self._rate, self._loads, self._near = time, rate, loads, near
 
@@ -222,10 +219,7 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends.
-
-        A part that goes on from another one is followed from its first posture before all.
-        """
+        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         movable, goes_on = bool((own.limits.lower < own.limits.upper).any()), self._goes_on(own)
         if movable and goes_on:  # others are seldom on the side of things that it is on

@@ -62,11 +62,7 @@ def hull_obj(hull: Any) -> str:
 
 
 class Occupied:
-    """The space that a figure takes up in some postures.
-
-    `places` (pin.SE3) and `centres` (n, 3) are those of all pieces in the first posture, then in the second, and so on;
-    then of balls. `count`: pieces of the figure.
-    """
+    """What a figure's `count` pieces fill in some postures, then balls: `places` (SE3), `centres` (n, 3)."""
 
     def __init__(self, figure: wb.Figure, postures: Iterable[Array]) -> None:
         """Place the figure's pieces at each posture (nq,)."""
