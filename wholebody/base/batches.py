@@ -56,11 +56,8 @@ def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) ->
 def shared(
     items: Sequence[T], jobs: int, here: Callable[[T], Any], there: Callable[[list[T], bool], Job]
 ) -> Iterator[tuple[T, Any, EndedError | None]]:
-    """Do work in this process and in `jobs - 1` others, which start meanwhile; returns answers or errors.
-
-    `here` does one item, `there` makes the job that does several, or None if the process lacks something: it is asked
-    again with True. Where all is done before the others are ready, they go on for the next call.
-    """
+    """Do work in this process, `here` an item, and in `jobs - 1` others by jobs of `there`; answers or errors."""
+    # `there` gives None where the process lacks something, and is asked again with True
     left, alone = deque(items), deque[T]()  # items whose process ended are done again, one by one
     with _children(min(jobs, len(items)) - 1) as others:
         for child in others:

@@ -106,12 +106,8 @@ class BodiesState:
 
 
 class Joints:
-    """All joints of a scene, as points that stay together.
-
-    A ball joint is one point, a hinge two points on its axis, as far apart as they hinder each other least. The program
-    of a step holds them (`step_program`) so that they are together at its end. After a step the velocities are made to
-    keep them together (as RATTLE does; Andersen, 1983), which only takes energy.
-    """
+    """Joints as points that stay together: one of a ball joint, two on a hinge's axis, as far apart as hinders least."""
+    # the step's program holds them, and then velocities do (RATTLE; Andersen 1983), which takes energy
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
         self._pieces = pieces

@@ -162,11 +162,8 @@ class PushedContacts:
 
 
 def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Surface) -> Array | None:
-    """Impulse (3,) on body B, N s: equation 9, with friction of equation 10; None if A and B do not approach.
-
-    `relative` (3,) is the velocity of B's point relative to A's, `normal` (3,) from A to B, and `mobility` (3, 3) the
-    change of that velocity by an impulse on B, and its opposite on A.
-    """
+    """Impulse (3,) on B [N s], equation 9 with friction of 10, of approach `relative` (3,); None if they part."""
+    # `normal` (3,) from A to B; `mobility` (3, 3): change of that velocity by an impulse on B, and its opposite on A
     approach, least = -float(normal @ relative), 1e-6  # m/s
     if approach <= least:
         return None
@@ -315,15 +312,7 @@ def axes_of(normal: Array) -> Array:
 def near_limits(
     model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
 ) -> list[tuple[int, float, float]]:
-    """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is.
-
-    Args:
-        model: has the limits.
-        limited: (k, 2) places of freedoms in q and in the velocity.
-        q: (nq,) posture.
-        velocity: (nv,).
-        time: seconds.
-    """
+    """Of `limited` (k, 2): places in q, velocity: that can come to a limit, the sign away from it, and how far."""
     at, freedom = limited.T
     gaps = q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]
     near = [gap < 0.02 + 1.5 * time * np.abs(velocity[freedom]) for gap in gaps]  # rad, m
@@ -331,15 +320,7 @@ def near_limits(
 
 
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
-    """Bounds (pairs,) of the speeds at which the pieces of pairs approach each other, m/s.
-
-    That of a point of the smaller piece, seen from the other: of its centre, and by rotation about that.
-
-    Args:
-        table: pieces and pairs.
-        centres: (n, 3) of the pieces, metres.
-        twist: (n, 6) of the pieces at the world's origin, m/s and rad/s.
-    """
+    """Bounds (pairs,) [m/s] of the approach of pieces with `centres` (n, 3) and twists (n, 6) at the origin."""
     first, second = table.pairs.T
     smaller = np.where(table.reach[first] < table.reach[second], first, second)
     relative = twist[first] - twist[second]
@@ -351,11 +332,8 @@ def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
 def drift(
     data: pin.Data, root: int, momentum: Array, gravity: Array, time: float, borne: bool
 ) -> tuple[pin.Force, Array]:
-    """Momentum about the origin and centre (3,) of what a free root carries, a time after its momentum (6,).
-
-    The centre moves by the mean of the velocities before and after, in a step with contacts (`borne`) by that after,
-    as the joints do. The weight acts where that keeps the angular momentum of a centre on its way.
-    """
+    """Momentum about the origin, and centre (3,), of what a free root carries, a time after its momentum (6,)."""
+    # the centre moves by the mean of both velocities, in a step with contacts (`borne`) by the later, as joints do
     place, share = data.oMi[root], 1.0 if borne else 0.5
     now = place.act(pin.Force(momentum))
     mass, centre = data.mass[root], place.act(data.com[root])

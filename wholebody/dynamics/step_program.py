@@ -163,11 +163,8 @@ class StepProgram:
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
-        """Change the velocities to those at the end of a step of `time` seconds, which adds no energy.
-
-        `together`: impacts during the step bounce by this program, else the first ends it; `old`: impulses of the step
-        before; `hold`: (j, 3) velocity of the joint points of B seen from those of A, m/s.
-        """
+        """Change the velocities to those at the end of a step of `time` [s], which adds no energy."""
+        # `together`: impacts bounce by it; `old` impulses; `hold` (j, 3): velocity of B's joint points by A's
         state, points = self.state, self.points
         twist, moving = state.bodies.twist, state.bodies.moving
         began = twist.copy()

@@ -257,11 +257,7 @@ def finger_degrees(degrees: Mapping[str, float]) -> dict[str, float]:
 
 
 def finger_effort(joint: str) -> float:
-    """Weight of a finger's joint in a person's effort, beside 1 of an elbow.
-
-    Fitted to typing, where 1.6 for flexion is best; half of it is used, because with more, grasps are found
-    less often. Of the thumb an ESTIMATE: it moves before an arm.
-    """
+    """Weight of a finger's joint in effort, beside 1 of an elbow: half of what fits typing, so grasps are found."""
     if "thumb" in joint:
         return 0.2
     return 0.8 if joint.endswith("flexion") else 0.4

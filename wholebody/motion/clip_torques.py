@@ -258,11 +258,7 @@ TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 
 def bearing(
     clip: Clip, q: Array, feet: Mapping[str, Mask], scene: Scene | None, friction: float
 ) -> tuple[InverseDynamics, tuple[str, ...], list[Stand]]:
-    """What bears the frames of a clip at smoothed postures q (n, nq), on feet in frames (n,) where they stand.
-
-    Returns the dynamics on the feet and on the segments that touch things, the names of both, and where each frame
-    stands. Without a scene, or with a root that is fixed, nothing else touches.
-    """
+    """Dynamics on feet and what else touches the scene at q (n, nq), names of both, and where frames stand."""
     figure, names, touches = clip.figure, tuple[str, ...](), list[Touches]()
     if scene is not None and figure.root == "free":
         names, touches = touching_parts(clip, scene, feet)

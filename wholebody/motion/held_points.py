@@ -60,11 +60,7 @@ def touching_points(
     wanted: Iterable[tuple[str, float, int]],
     joints: Mapping[str, str],
 ) -> list[HeldPoint]:
-    """The points of a figure that touch things: of a hand as far from the wrist as the skeleton's joint is.
-
-    `wanted` are their roles, shares and bases, `joints` those of the skeleton's roles; the end of the arm touches of a
-    figure without hands.
-    """
+    """Points that touch things: of a hand as far from the wrist as the skeleton's; `wanted`: roles, shares, bases."""
     found, data, own = [], figure.model.createData(), figure_roles(figure)
     pin.framesForwardKinematics(figure.model, data, upright(figure))
     placed = roles.places(figure)

@@ -237,11 +237,8 @@ class Holds:
     def goals(
         self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False, span: int = 1
     ) -> tuple[Array, Array]:
-        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body.
-
-        Of every `span`-th frame the last one before a rest and the first one after it are at rest too, so that what
-        lies between two of these frames is.
-        """
+        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
+        # of every `span`-th frame those beside a rest are at rest too, so that what lies between them is
         down, strong = self._facing_down(paths[frame]), STRONG / self._dt**2 if again else FIRM / (span * self._dt)
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):

@@ -50,11 +50,8 @@ class LoadChange:
 
     @property
     def farther(self) -> Array:
-        """(m,) by how much farther the zero moment point is outside of the support than it was before, metres.
-
-        A frame between two of those before is compared with the worse of both, and a foot stands there before if it
-        stands in both. It is 0 where other feet stand than before, or other parts touch: the support is another one.
-        """
+        """(m,) by how much farther [m] the zero moment point is out than before, or than the worse of two frames."""
+        # 0 where other feet stand than before, or other parts touch: the support is another one
         old, last = self.before, len(self.before.outside) - 1
         first, second = (np.clip(near(self.times).astype(int), 0, last) for near in (np.floor, np.ceil))
         was, now = (_marks(loads, (*old.feet, *self.after.feet)) for loads in (old, self.after))
@@ -65,11 +62,7 @@ class LoadChange:
 
     @property
     def unsupported(self) -> Array:
-        """(m,) share of the weight by which the ground lacks more of the force that the motion needs than before.
-
-        It is compared with the largest lack before within 0.1 s, as feet may leave the ground so much earlier or later.
-        Feet that no longer stand give nothing, and a flight that is slowed needs a force.
-        """
+        """(m,) share of the weight that the ground lacks more than at most within 0.1 s before the change."""
         old, new = (np.linalg.norm(loads.missing[:, :3], axis=1) for loads in (self.before, self.after))
         reach, figure = max(1, round(0.1 / self.after.dt)), self.after.figure
         near = sliding_window_view(np.pad(old, reach), 2 * reach + 1).max(axis=1)

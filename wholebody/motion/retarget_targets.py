@@ -357,11 +357,7 @@ def soled(motion: SkeletonMotion, joint: Mapping[str, int], known: Mapping[str, 
 
 
 def flat_turns(motion: SkeletonMotion, roles: Roles, stands: Mapping[str, Mask]) -> dict[str, Array]:
-    """Rotations (3, 3) in the ankles' axes, by role, from the foot of the rest posture to one that is flat where it is.
-
-    Rest postures have feet that are rolled by 20 degrees, where the legs are apart. While ankle and toe both stand (n,)
-    the sole is flat.
-    """
+    """Rotations (3, 3) in ankles' axes by role, from the rest posture's foot to a flat one, of standing frames (n,)."""
     found = {}
     for side in ("left", "right"):
         ankle, toe = f"{side}_ankle", f"{side}_toe"

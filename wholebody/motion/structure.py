@@ -274,11 +274,7 @@ def _centres(meeting: Mapping[str, list[int]], real: Array, axes: Array) -> dict
 
 
 def _is_person(joints: Mapping[str, int], places: Mapping[str, Array], walks: bool) -> bool:
-    """Whether shoulders stand above hips, by their places (3,), and no joint but a forearm's has two roles.
-
-    Those of a quadruped are beside each other, and its legs end at their knees. What `walks` may have legs alone, whose
-    hips stand above its ankles.
-    """
+    """Whether shoulders (3,) stand above hips, and no joint but a forearm's has two roles; of what `walks`, hips."""
     arms = "left_shoulder" in places
     if not {"left_hip", "left_ankle"} <= places.keys() or not (arms or walks):
         return False

@@ -253,11 +253,8 @@ def own_rests(
     shares: Mapping[str, float],
     busy: Sequence[tuple[str, int, int]],
 ) -> list[ThingContact]:
-    """When hands of a skeleton touch their own body, by the roles of its `joints`, and from where.
-
-    `shares` are those of the hands, see `hand_shares`. The normals are in the world, in the middle frame of each; the
-    places are not said. Hands do not that are `busy`: roles with first frames and ends.
-    """
+    """When hands touch their own body, by roles of `joints` and `shares`, but where `busy` (role, first, end)."""
+    # normals are in the world, in the middle frame of each; the places are not said
     at = {role: motion.positions[:, motion.names.index(joint)] for role, joint in joints.items()}
     turns = {role: motion.rotations[:, motion.names.index(joint)] for role, joint in joints.items()}
     for part in ("hip", "shoulder"):

@@ -191,11 +191,8 @@ class Geodesics:
 
 
 class TrackedMotions:
-    """Motions by steps of the QP tracker, for figures that keep constraints on the way.
-
-    Where nothing is held, a posture is the minimum of a measure, and steps are as long as distances allow. Else it is a
-    goal, and steps are short, as what is held is missed by the square of a step.
-    """
+    """Motions by steps of the QP tracker, for figures that keep constraints on the way."""
+    # postures are minima of a measure; where something is held goals, with short steps, which miss it by squares
 
     searches: ClassVar[int] = 2
     samples: ClassVar[int] = 12

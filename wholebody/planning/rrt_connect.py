@@ -73,12 +73,8 @@ class RRTConnect:
         self._trees[1].add(end)
 
     def grow(self, sample: Array) -> list[Array] | None:
-        """Extend the smaller tree towards a sample (nq,), and the other one towards what was reached.
-
-        A tree in a narrow place, from which most samples are out of reach, gets them all until it is out of there.
-
-        Returns postures from the start to an end if the trees meet.
-        """
+        """Extend the smaller tree towards a sample (nq,), the other towards what was reached; a path where they meet."""
+        # a tree in a narrow place, out of reach of most samples, has them all till it is out
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)
         there = 1 - here

@@ -94,11 +94,7 @@ class Workspace(NotCopyable):
         return self.geometry.geometryObjects[index].placement * local.inverse()
 
     def next_frame(self, q: Array) -> FrameMotion | None:
-        """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
-
-        Things are where it ends. Those that were put into the figure are among them: it leaves them, or reports them.
-        The figure begins at the posture q (nq,).
-        """
+        """The frame of the things that moved since the last one, or are in the figure at q (nq,); None without any."""
         if not (self.moved or self._inside):
             return None
         still = [name for name, (before, after) in self.moved.items() if before == after]

@@ -206,12 +206,8 @@ def usual_constraints(
 def default_constraints(
     scene: Scene, start: Array, known: Set[type], *, ranges: bool, standing: Sequence[str], required: bool
 ) -> tuple[tuple[Constraint, ...], str]:
-    """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
-
-    `standing` are the figures that keep their balance, by what their names begin with. One who stands at the start on a
-    line, such as the tips of two toes, keeps no balance that is measured by an area. The default is left out there,
-    unless it is required.
-    """
+    """What is added to stated constraints, whose classes replace it; `standing`: names of figures that keep balance."""
+    # who stands on a line at the start keeps no balance that is measured by an area, unless it is required
     figure = scene.figure
     found: list[Constraint] = []
     if ranges and figure.ranges and RangeOfMotion not in known:

@@ -67,11 +67,8 @@ class FrameMotionLimit(Bound):
 
 
 class QPStrategy:
-    """Follows tracked postures by a tracker of `QP`, in frames of `dt` seconds, from an overlap-free start (nq,).
-
-    A `rigid` figure is displaced as a whole while its joints follow the tracker. It may touch the things in `touching`;
-    from all others it keeps `CLEARANCE`.
-    """
+    """Follows tracked postures by a tracker of `QP`, `dt` [s], from a free start (nq,); `rigid` figures as a whole."""
+    # things in `touching` may be touched; from all others the figure keeps `CLEARANCE`
 
     sweep_tolerance = 5e-5
 

@@ -141,11 +141,8 @@ class Queue:
 
 
 class Guard:
-    """Which requests a server of ours answers: those that call this machine by its name, from our own pages.
-
-    A request of any other name reached this machine by DNS rebinding. One with another origin is of a page of somebody
-    else that runs in the user's browser.
-    """
+    """Which requests a server of ours answers: to this machine's name, from our own pages."""
+    # another name reached this machine by DNS rebinding; another origin is somebody else's page in the user's browser
 
     def __init__(self, host: str) -> None:
         names = {*LOCAL, host.lower()}

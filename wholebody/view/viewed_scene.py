@@ -81,11 +81,7 @@ def checked_scene(scene: Any) -> Any:
 
 
 class ViewedWorld:
-    """A figure, the things that stay, and things that move, which have joints here.
-
-    A posture is what `configuration` makes of one of the figure's and the placements of the things that move. So
-    `Viewer(ViewedWorld(scene, names)).play(configurations, dt)` shows all of them move.
-    """
+    """A figure, things that stay, and things that move, which have joints here; postures are of `configuration`."""
 
     revision = 0
 

@@ -118,11 +118,7 @@ TOOLS = ("wholebody", "mink, GMR's weights")
 
 
 def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator[Row]:
-    """A row for each recording of a folder (BVH), figure and tool; `frames` are the first ones that are followed.
-
-    Raises:
-        InputError: there is no recording.
-    """
+    """A row for each recording (BVH) in a folder, figure and tool, of `frames`; InputError without recordings."""
     files = sorted(folder.rglob("*.bvh"))
     if not files:
         raise InputError(f"{folder}: there are no .bvh files; give a folder of recordings")

@@ -104,11 +104,8 @@ class MotionBounds:
 
 
 def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
-    """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.
-
-    `centres` (n,): how far a piece's origin is from its joint's, infinite where placed anew; `most` (nv,) or (nv, m):
-    largest displacements of one motion or of m, radians and metres, for which the answer is (pairs, m).
-    """
+    """Most (pairs,) [m] by which distances can fall for displacements `most` (nv,), or (pairs, m) for (nv, m)."""
+    # `centres` (n,): how far a piece's origin is from its joint's, infinite where placed anew
     model = table.model
     moved = np.array([_motion(model, joint, most) for joint in range(model.njoints)])
     lengths = np.array([_length(model, joint) for joint in range(model.njoints)])

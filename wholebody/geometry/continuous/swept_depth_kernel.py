@@ -149,11 +149,8 @@ class Sliding(NamedTuple):
 
 @compiled()
 def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) -> None:
-    """Raise the shares `safe` (k,) of a motion for which pairs stay apart, from heights above planes to second order.
-
-    A height has its exact rate now, and an acceleration of at most `_curvature`. The planes are across coal's normal
-    and across that of the face nearest to it, from which coal's can be 1e-4 rad off where faces touch.
-    """
+    """Raise the shares `safe` (k,) of a motion in which pairs stay apart, from heights above planes to second order."""
+    # planes across coal's normal and across the nearest face's, which coal's is up to 1e-4 rad off where faces touch
     asked, rows, level, place, _ = sliding
     pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
     outline, limits = (points, first_point, radius, radii), (motion.turn, motion.speed, motion.carries)

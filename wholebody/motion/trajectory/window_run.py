@@ -126,11 +126,8 @@ class ClipRun:
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
         around: Array | None = None, whole: bool = True, patient: bool = True,
     ) -> WindowResult:  # fmt: skip
-        """Free one window; a `cancel` that says so leaves it as it was.
-
-        `begun` (n, nq) has postures to begin with, `around` those that stay beyond the window, the originals if
-        None; with `whole` false the last frame of a part is free. What ended early goes on only if `patient`.
-        """
+        """Free one window, from `begun` (n, nq), among postures `around` beyond it; a `cancel` leaves it as it was."""
+        # with `whole` false the last frame of a part is free; what ended early goes on only if `patient`
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)

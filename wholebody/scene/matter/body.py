@@ -32,11 +32,7 @@ from wholebody.geometry.shapes import (
 
 
 class Surface(NamedTuple):
-    """What happens where two materials touch.
-
-    The restitution is the speed of separation as a share of the speed of approach, the friction the greatest tangential
-    force as a share of the normal one (Coulomb).
-    """
+    """What happens where two materials touch: restitution (share of the speed of approach), and Coulomb's friction."""
 
     restitution: float
     friction: float
