@@ -106,7 +106,8 @@ class BodiesState:
 
 
 class Joints:
-    """Joints as points that stay together: one of a ball joint, two on a hinge's axis, as far apart as hinders least."""
+    """Joints as points that stay together, one of a ball joint, two on a hinge's axis, where they hinder least."""
+
     # the step's program holds them, and then velocities do (RATTLE; Andersen 1983), which takes energy
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:

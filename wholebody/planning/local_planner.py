@@ -192,6 +192,7 @@ class Geodesics:
 
 class TrackedMotions:
     """Motions by steps of the QP tracker, for figures that keep constraints on the way."""
+
     # postures are minima of a measure; where something is held goals, with short steps, which miss it by squares
 
     searches: ClassVar[int] = 2

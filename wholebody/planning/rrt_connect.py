@@ -73,7 +73,7 @@ class RRTConnect:
         self._trees[1].add(end)
 
     def grow(self, sample: Array) -> list[Array] | None:
-        """Extend the smaller tree towards a sample (nq,), the other towards what was reached; a path where they meet."""
+        """Extend the smaller tree to a sample (nq,), the other to what was reached; a path where they meet."""
         # a tree in a narrow place, out of reach of most samples, has them all till it is out
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)

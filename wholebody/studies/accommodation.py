@@ -167,7 +167,7 @@ class Accommodation(Shown):
         return sum(held) / len(held) if held else math.nan
 
     def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
-        """The dimension that orders people best (Mann and Whitney 1947), and the bound that parts them (Youden 1950)."""
+        """The dimension that orders people best (Mann and Whitney 1947), and a bound that parts them (Youden 1950)."""
         # where both ends are, people are ordered by how far from the others' middle they are
 
         def apart(name: str) -> float:

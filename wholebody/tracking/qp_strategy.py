@@ -68,6 +68,7 @@ class FrameMotionLimit(Bound):
 
 class QPStrategy:
     """Follows tracked postures by a tracker of `QP`, `dt` [s], from a free start (nq,); `rigid` figures as a whole."""
+
     # things in `touching` may be touched; from all others the figure keeps `CLEARANCE`
 
     sweep_tolerance = 5e-5

@@ -142,6 +142,7 @@ class Queue:
 
 class Guard:
     """Which requests a server of ours answers: to this machine's name, from our own pages."""
+
     # another name reached this machine by DNS rebinding; another origin is somebody else's page in the user's browser
 
     def __init__(self, host: str) -> None:
