@@ -791,7 +791,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "sight",
         Call(
             wb.ergonomics.sight,
-            {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5), "field": wb.ergonomics.FieldOfView()},
+            {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5)},
         ),
     )
     cone = {"horizontal": 0.5, "up": 0.5, "down": 0.5, "declination": 0.2}

@@ -226,11 +226,11 @@ class Server:
         """Wait until a tab shows the page; False if none did within `timeout` seconds."""
         return self._until(lambda: bool(self.tabs), timeout)
 
-    def wait_until_closed(self, timeout: float, grace: float = 2.0) -> bool:
-        """Wait until no tab has shown the page for `grace` seconds; False if one still did after `timeout` seconds."""
+    def wait_until_closed(self, timeout: float) -> bool:
+        """Wait until no tab has shown the page for two seconds; False if one still did after `timeout` seconds."""
         end = time.monotonic() + timeout
         while self._until(lambda: not self.tabs, end - time.monotonic()):
-            if not self.wait(min(grace, end - time.monotonic())):
+            if not self.wait(min(2.0, end - time.monotonic())):
                 return True
         return False
 
