@@ -18,9 +18,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, between
 from wholebody.motion.clip_torques import CUTOFF, bearing, smoothed
-from wholebody.motion.frame_terms import FrameTerms, between
+from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.inverse_dynamics import (
     FRICTION,
     LIGHT,

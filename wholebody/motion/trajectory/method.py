@@ -13,9 +13,9 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Range
 from wholebody.motion.avoider import MethodResult, Run
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, between
 from wholebody.motion.faults import Faults
-from wholebody.motion.frame_terms import FrameTerms, between
+from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
