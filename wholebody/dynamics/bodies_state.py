@@ -36,8 +36,7 @@ class BodiesState:
     @property
     def active(self) -> Mask:
         """(n,) bodies that move, by themselves or because their motion is given."""
-        found: Mask = self.bodies.moving | self.bodies.given
-        return found
+        return np.asarray(self.bodies.moving | self.bodies.given)
 
     def put(self, number: int, at: pin.SE3) -> None:
         """Place a body."""
@@ -147,8 +146,7 @@ class Joints:
 
     def linked(self, number: int) -> Mask:
         """Bodies (n,) that move by themselves and are linked with one by joints, itself among them."""
-        found: Mask = self._pieces.dynamic & (self._island == self._island[number])
-        return found
+        return np.asarray(self._pieces.dynamic & (self._island == self._island[number]))
 
     def together(self) -> Indices:
         """(k, 2) bodies that joints hold together, one of which moves by itself at least."""

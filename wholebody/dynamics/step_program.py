@@ -246,8 +246,7 @@ class StepProgram:
 
     def _bearing(self) -> Mask:
         """Contact points (m,) that bear something."""
-        found: Mask = self.impulse[: len(self.points.gap), 0] > 0.0
-        return found
+        return np.asarray(self.impulse[: len(self.points.gap), 0] > 0.0)
 
     def separation(self, gap: float) -> Array:
         """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""

@@ -89,8 +89,7 @@ class Torques:
     def share(self) -> Array:
         """(n, nv) torque as a share of the strength in its direction; more than 1 is more than the person can."""
         limit = np.where(self.torque >= 0.0, self.upper, -self.lower)
-        found: Array = np.abs(self.torque) / limit
-        return found
+        return np.asarray(np.abs(self.torque) / limit)
 
     @property
     def largest_share(self) -> float:
@@ -248,8 +247,7 @@ def _pressure(pressed: Array, points: Array) -> Array:
     load = float(pressed.sum())
     if load <= 0.0:
         return np.zeros(3)
-    found: Array = pressed @ points / load
-    return found
+    return np.asarray(pressed @ points / load)
 
 
 TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 1 mm away, and avoiders keep a clearance

@@ -103,8 +103,7 @@ class Stand(NamedTuple):
 
     def margins(self, place: Array) -> Array:
         """(e,) distances of a place (2,) from the edges, metres; positive inside."""
-        found: Array = self.normals @ place - self.offsets
-        return found
+        return np.asarray(self.normals @ place - self.offsets)
 
 
 class Loads(NamedTuple):
@@ -302,14 +301,12 @@ def zero_moment_point(wrench: Array, height: float) -> Array:
     """(2,) where the ground gives a wrench (6,) without a horizontal moment, metres; its vertical force is not zero."""
     # Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life"
     force, turning = wrench[:3], wrench[3:]
-    found: Array = np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2]
-    return found
+    return np.asarray(np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2])
 
 
 def moved(wrench: Array, center: Array) -> Array:
     """A wrench (6,) about another point than the world's origin."""
-    found: Array = np.concatenate([wrench[:3], wrench[3:] - cross(center, wrench[:3])])
-    return found
+    return np.asarray(np.concatenate([wrench[:3], wrench[3:] - cross(center, wrench[:3])]))
 
 
 def moving(center: Array) -> Array:

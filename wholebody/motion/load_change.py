@@ -57,8 +57,7 @@ class LoadChange:
         was, now = (_marks(loads, (*old.feet, *self.after.feet)) for loads in (old, self.after))
         same = ((was[first] & was[second]) == now).all(axis=1)
         past = self.after.outside - np.maximum(old.outside[first], old.outside[second])
-        found: Array = np.where(same, np.maximum(past, 0.0), 0.0)
-        return found
+        return np.asarray(np.where(same, np.maximum(past, 0.0), 0.0))
 
     @property
     def unsupported(self) -> Array:
@@ -68,8 +67,7 @@ class LoadChange:
         near = sliding_window_view(np.pad(old, reach), 2 * reach + 1).max(axis=1)
         places = np.clip(np.rint(self.times).astype(int), 0, len(old) - 1)
         weight = pin.computeTotalMass(figure.model) * float(np.linalg.norm(figure.model.gravity.linear))
-        found: Array = np.maximum(new - near[places], 0.0) / max(weight, np.finfo(float).tiny)
-        return found
+        return np.asarray(np.maximum(new - near[places], 0.0) / max(weight, np.finfo(float).tiny))
 
     @property
     def missed(self) -> list[str]:

@@ -220,8 +220,7 @@ def _ratio(own: _Body, source: _Body, first: str, second: str) -> float:
 
 def _directed(own: _Body, source: _Body, first: str, second: str, start: Array) -> Array:
     """(n, 3) from a start along the skeleton's way from one role to another, at the figure's length."""
-    found: Array = start + source.way(first, second) * _ratio(own, source, first, second)
-    return found
+    return np.asarray(start + source.way(first, second) * _ratio(own, source, first, second))
 
 
 def known_bones(limb: tuple[str, ...], side: str, roles: Collection[str]) -> list[tuple[str, str]]:
@@ -303,8 +302,7 @@ def _hand_turn(motion: SkeletonMotion, joint: dict[str, int], side: str, axes: A
     fingers = fingers / np.linalg.norm(fingers)
     inward = (-1.0 if side == "left" else 1.0) * axes[:, 1]
     palm = inward if abs(fingers @ axes[:, 2]) > UPRIGHT else -axes[:, 2]  # hanging arms, or arms out with palms down
-    turned: Array = motion.rotations[:, motion.parents[hand]] @ _frame(fingers, palm)
-    return turned
+    return np.asarray(motion.rotations[:, motion.parents[hand]] @ _frame(fingers, palm))
 
 
 def _frame(along: Array, towards: Array) -> Array:

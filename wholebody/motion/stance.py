@@ -251,8 +251,7 @@ def _push(first: _Foot, second: _Foot, frames: Sequence[dict[str, pin.SE3]], bef
         if least >= (apart_by if far else 0.0):
             break
         far += max(apart_by - least, 1e-4)
-    found: Array = far * way
-    return found
+    return np.asarray(far * way)
 
 
 def _middle(foot: _Foot, places: dict[str, pin.SE3]) -> Array:

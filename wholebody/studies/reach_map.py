@@ -121,8 +121,7 @@ class _Grid(NamedTuple):
         """(places,) how many of the places beside each are marked."""
         padded = np.pad(marked.reshape([len(axis) for axis in self.axes]).astype(np.intp), 1)
         counts = [np.roll(padded, way, axis)[1:-1, 1:-1, 1:-1] for axis in range(3) for way in (1, -1)]
-        found: Indices = np.sum(counts, axis=0).ravel()
-        return found
+        return np.asarray(np.sum(counts, axis=0).ravel())
 
 
 def reach_map(

@@ -153,8 +153,7 @@ def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list
 
 def _along(way: Array) -> Array:
     """(3, 3) a rotation that brings z along a direction."""
-    found: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix()
-    return found
+    return np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix())
 
 
 GAP = 6  # pixels between two pictures

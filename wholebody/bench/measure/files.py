@@ -316,8 +316,7 @@ def _rest_turn(role: str, own: dict[str, Array], rest: Array, joints: dict[str, 
             mine = role == first or (role == last and end == limb[2] and limb[0] == "shoulder")
             if mine and {first, last} <= own.keys() & joints.keys():
                 bones = own[last] - own[first], rest[joints[last]] - rest[joints[first]]
-                found: Array = pin.Quaternion.FromTwoVectors(*bones).toRotationMatrix()
-                return found
+                return np.asarray(pin.Quaternion.FromTwoVectors(*bones).toRotationMatrix())
     return np.eye(3)
 
 

@@ -108,8 +108,7 @@ def _values(field: Field, start: Array, blocks: NDArray[np.int64], cell: float) 
     points = start + cell * (BLOCK * numbers[near][:, None, :] + steps)
     found[near] = field(points.reshape(-1, 3)).reshape(-1, BLOCK**3)
     shape = (*blocks, BLOCK, BLOCK, BLOCK)
-    whole: Array = found.reshape(shape).transpose(0, 3, 1, 4, 2, 5).reshape(tuple(blocks * BLOCK))
-    return whole
+    return np.asarray(found.reshape(shape).transpose(0, 3, 1, 4, 2, 5).reshape(tuple(blocks * BLOCK)))
 
 
 _CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]

@@ -182,8 +182,7 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
     # of two solutions within the limits the one nearer to the neutral posture
     resting = np.array([figure.joint_values(figure.neutral)[figure.model.names[joint]] for joint in node.joints])
     best = (beyond + 1e-3 * np.abs(choices - resting).sum(axis=2)).argmin(axis=0)
-    chosen: Array = choices[best, np.arange(len(turns))]
-    return chosen
+    return np.asarray(choices[best, np.arange(len(turns))])
 
 
 def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
@@ -198,8 +197,7 @@ def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
 
 def wrapped(angles: Array) -> Array:
     """Angles between minus and plus half a turn, radians."""
-    found: Array = (angles + np.pi) % (2.0 * np.pi) - np.pi
-    return found
+    return np.asarray((angles + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _segment(figure: Figure, joint: int) -> str:

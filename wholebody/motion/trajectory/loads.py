@@ -309,5 +309,4 @@ def standing_frames(places: Array, feet: Array) -> Indices:
     # A foot stands between frames if it stands in both: of two it is the one with fewer feet, or the nearer.
     near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
     fewer = np.where(feet[below] < feet[above], below, above)
-    found: Indices = np.where(feet[below] == feet[above], near, fewer)
-    return found
+    return np.asarray(np.where(feet[below] == feet[above], near, fewer))

@@ -68,8 +68,7 @@ class Rows(NamedTuple):
         """(r,) what programs ask of each row: room of a missed one, of another no less of it than it has."""
         # soles sink a little between frames; room of them too would bend the whole body
         room, least = self.node.room, -MET if self.node.share else 0.0
-        asked: Array = np.where(self.gap < least, room, np.minimum(self.gap, room))
-        return asked
+        return np.asarray(np.where(self.gap < least, room, np.minimum(self.gap, room)))
 
     @property
     def shortfalls(self) -> Array:

@@ -170,8 +170,7 @@ def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:
     reach = np.zeros(len(one.gap))
     for part in one.parts:
         reach += np.abs(part[:, dofs]).sum(axis=1)
-    found: Mask = (one.gap < one.node.room + radius * reach) & (reach > 0.0)
-    return found
+    return np.asarray((one.gap < one.node.room + radius * reach) & (reach > 0.0))
 
 
 def likely(one: Rows, radius: float) -> Mask:
@@ -267,5 +266,4 @@ def _brought_back(x: Array, past: Array, radius: float) -> Array:
     # It can shift all later frames, or reduce every deviation by a share.
     shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
     shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
-    found: Array = np.maximum(shifted, shrunk)
-    return found
+    return np.asarray(np.maximum(shifted, shrunk))

@@ -107,8 +107,7 @@ class _Window(NamedTuple):
     def deviations(self, q: Array) -> Array:
         """(n, nv) deviations of postures (n, nq), within limits."""
         x = np.array([self.chart.deviation(frame, posture) for frame, posture in enumerate(q)])
-        found: Array = np.clip(x, self.limits.lower, self.limits.upper)
-        return found
+        return np.asarray(np.clip(x, self.limits.lower, self.limits.upper))
 
 
 class ClipRun:
