@@ -93,8 +93,7 @@ def shared(
                     yield from ((item, answer, None) for item, answer in zip(chunk, outcome.answer, strict=True))
 
 
-_ready = object()
-"""Name of a job by which a process gets ready."""
+_ready = object()  # name of a job by which a process gets ready
 
 _idle: dict[int, list[Child]] = {}
 """Processes that are kept for the next call, by the id of the process that began them: a fork has its own."""

@@ -58,8 +58,7 @@ LOOPS = tuple(name for names in TOGETHER for name in names)
 PRECOMPILED = Path(__file__).with_name("precompiled")
 """Folder of a wheel with loops that the maker's numba and Python compiled for the processor `BASELINE`."""
 
-BASELINE = ("x86-64-v3", "")
-"""LLVM's name of a processor with AVX2, and no more features than it has."""
+BASELINE = ("x86-64-v3", "")  # LLVM's name of a processor with AVX2, and no more features than it has
 
 BASELINE_FEATURES = frozenset(("+avx", "+avx2", "+bmi", "+bmi2", "+f16c", "+fma", "+lzcnt", "+movbe"))
 """What a processor must have to run code for `BASELINE`."""

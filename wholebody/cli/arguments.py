@@ -13,8 +13,7 @@ from wholebody.base.checks import is_number
 from wholebody.base.errors import InputError, UnknownNameError, suggestion
 from wholebody.cli.command import Option, checked, count, flag, option
 
-JOINED = "X,Y,Z"
-"""How the help shows numbers that are joined by commas."""
+JOINED = "X,Y,Z"  # how the help shows numbers that are joined by commas
 
 
 class Parser(argparse.ArgumentParser):

@@ -13,8 +13,7 @@ from wholebody.base.errors import InputError
 Measure = Callable[[argparse.Namespace], "int | None"]
 """Runs a command; None is the exit code 0."""
 
-Option = Callable[[argparse.ArgumentParser], object]
-"""Adds itself to a parser."""
+Option = Callable[[argparse.ArgumentParser], object]  # adds itself to a parser
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
 from wholebody.figures.tables import keyed, named_angles
 
-MESH = "meshes/ellipsoid.obj"
-"""The unit polyhedron that the URDF scales to each part."""
+MESH = "meshes/ellipsoid.obj"  # the unit polyhedron that the URDF scales to each part
 
 FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}
 SIDES = ("left", "right")

@@ -23,8 +23,7 @@ from wholebody.figures.tables import table
 
 SEXES = {"male": "men", "female": "women"}
 
-UNITS = {"mass": "kg", "age": "years"}
-"""Units of the dimensions that are not lengths."""
+UNITS = {"mass": "kg", "age": "years"}  # units of the dimensions that are not lengths
 
 NEAR = 2.0
 """Years from an end of the ages. Few were measured nearer to it and nobody beyond it: they have the dimensions of those

@@ -21,8 +21,7 @@ from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 
-MOST_NEIGHBOURS = 255
-"""Most edges at one vertex that coal can represent."""
+MOST_NEIGHBOURS = 255  # most edges at one vertex that coal can represent
 
 FEW = 1000
 """Number of points up to which duplicates are dropped before the hull is made; of more points qhull drops them."""
@@ -207,8 +206,7 @@ def _vertices(planes: Array, inside: Array) -> Array:
     return np.asarray(found[ConvexHull(found).vertices])
 
 
-SIDES = 64
-"""Sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser."""
+SIDES = 64  # sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser
 
 SECTORS, TUBE_SIDES = 24, 12
 """Pieces of a ring, and sides of its tube: 24 and 12 are 1 % of the radius and 4 % of the tube too far out."""

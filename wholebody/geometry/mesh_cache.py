@@ -27,8 +27,7 @@ from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece, hull_triangles
 from wholebody.version import __version__
 
-VARIABLE = "WHOLEBODY_CACHE"
-"""Environment variable that names another folder for the cache."""
+VARIABLE = "WHOLEBODY_CACHE"  # environment variable that names another folder for the cache
 
 LARGEST_CACHE = 256 * 2**20  # bytes; a mesh as hull takes 3 kB, a decomposition 20 kB
 LOOKED_AT_EVERY = 64  # writes of a process between checks of the cache's size; the first write checks it too

@@ -35,8 +35,7 @@ class AvoidProgress(NamedTuple):
     note: str
 
 
-Progress = Callable[[AvoidProgress], Any]
-"""Called now and then; if it returns True, the method ends with what it has."""
+Progress = Callable[[AvoidProgress], Any]  # called now and then; if it returns True, the method ends with what it has
 
 
 class Watch:

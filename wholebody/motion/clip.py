@@ -27,8 +27,7 @@ ROOT_SIZE = 7  # values of a free root
 LARGEST = 1e6  # of a value, radians or metres
 MOST_FRAMES = 1_000_000  # of a clip: ten hours at 30 frames a second; more would be gigabytes
 DRAWN = 8  # joints of `Clip.plot`
-ROUNDING = 1e-9
-"""Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
+ROUNDING = 1e-9  # share of a time step by which a time may be outside of a clip: the rounding of sums of steps
 SAME = 0.01  # of a time step: files write 0.0333333 s for a thirtieth, and their last frame is then there too
 
 

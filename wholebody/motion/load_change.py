@@ -16,11 +16,9 @@ from wholebody.motion.clip_torques import Torques
 TORQUE = 0.02
 """Share of its bound by which a torque may be beyond it: what filters and the frames in which feet stand change."""
 
-PLACE = 2e-3
-"""Metres by which the zero moment point may be farther outside, for the same reason."""
+PLACE = 2e-3  # metres by which the zero moment point may be farther outside, for the same reason
 
-FORCE = 0.05
-"""Share of the weight by which the ground may lack more force."""
+FORCE = 0.05  # share of the weight by which the ground may lack more force
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 
-MIRROR = np.diag([1.0, -1.0, 1.0])
-"""Reflection at the plane y = 0."""
+MIRROR = np.diag([1.0, -1.0, 1.0])  # reflection at the plane y = 0
 
 PLACEMENT = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
 """The same of a placement (7,): (x, -y, z), and of a rotation R, which becomes M R M, the x and z of the axis."""

@@ -20,15 +20,12 @@ from wholebody.motion.skeleton import RIGID, SkeletonMotion
 from wholebody.motion.standing_ground import Ground
 from wholebody.motion.structure import LIMBS, upright
 
-SMALL = 1e-9
-"""Metres: shorter vectors have no direction."""
+SMALL = 1e-9  # metres: shorter vectors have no direction
 
 
-UPRIGHT = 0.7
-"""Cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands."""
+UPRIGHT = 0.7  # cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands
 
-ALIKE = 0.9
-"""Length of the mean of directions that are one direction, with the errors of a recording."""
+ALIKE = 0.9  # length of the mean of directions that are one direction, with the errors of a recording
 
 
 class Targets(NamedTuple):

@@ -30,8 +30,7 @@ from wholebody.motion.windows import Window, runs
 from wholebody.tasks import Hold
 
 FEET = ("left_foot", "right_foot")
-POINTS = ("heel", "ball", "toe_tip")
-"""Ends of the names of frames that are points of a foot."""
+POINTS = ("heel", "ball", "toe_tip")  # ends of the names of frames that are points of a foot
 
 
 def foot_points(figure: Figure) -> tuple[str, ...]:

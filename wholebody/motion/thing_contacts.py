@@ -67,8 +67,7 @@ class Piece(NamedTuple):
     reach: float  # metres from its origin to its farthest point
 
 
-Placed: TypeAlias = tuple[coal.CollisionGeometry, pin.SE3]
-"""A shape, and where it is in the world."""
+Placed: TypeAlias = tuple[coal.CollisionGeometry, pin.SE3]  # a shape, and where it is in the world
 
 
 def least_distance(first: Sequence[Placed], second: Sequence[Placed]) -> float:

@@ -292,5 +292,4 @@ class TrackedMotions:
         return float(np.linalg.norm(factors * self.shares * pin.difference(self._model, q, target)))
 
 
-LocalPlanner: TypeAlias = Geodesics | TrackedMotions
-"""What makes the edges of trees."""
+LocalPlanner: TypeAlias = Geodesics | TrackedMotions  # what makes the edges of trees

@@ -19,8 +19,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, Feet, Margin, SolePolygon, standing_corners
 from wholebody.tasks.base import ComputedTogether, filled
 
-GRAVITY = 9.81
-"""m/s^2, as in Pinocchio's models."""
+GRAVITY = 9.81  # m/s^2, as in Pinocchio's models
 
 MOST_FORCE = 1e5  # N: a greater force is a mistake of units
 

@@ -12,8 +12,7 @@ from wholebody.base.compiled import compiled
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import SMALL, equidistant, inverse_left, rotation_vector
 
-Table: TypeAlias = tuple[Array, Integers]
-"""Numbers and places of the terms of one kind, a row each."""
+Table: TypeAlias = tuple[Array, Integers]  # numbers and places of the terms of one kind, a row each
 
 Carried: TypeAlias = tuple[Array, Integers, NDArray[np.int8]]
 """Columns of the joint Jacobian (n, 6), the degree of freedom of each, and which of them move a joint (njoints, n)."""

@@ -46,8 +46,7 @@ of them for each angle of an ellipse; TWIST: joint, joint of the reference.
 """
 
 Integers: TypeAlias = NDArray[np.int64]
-Row: TypeAlias = tuple[tuple[int, ...], Array]
-"""Integers and floats of a row of a table."""
+Row: TypeAlias = tuple[tuple[int, ...], Array]  # integers and floats of a row of a table
 
 _NO_EDGES: Array = np.zeros((0, 15))
 

@@ -12,8 +12,7 @@ from wholebody.tasks.axis import NO_ANGLE, STEEPEST, TOUCHING
 from wholebody.tasks.range_of_motion import OPPOSITE
 from wholebody.terms.entries import Integers
 
-SMALL = 1e-4
-"""Angle [rad] below which the series of log and its derivative are exact to rounding."""
+SMALL = 1e-4  # angle [rad] below which the series of log and its derivative are exact to rounding
 
 
 @compiled(inner=True)

@@ -199,8 +199,7 @@ def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) ->
 
 FILE = SceneFile(Path(__file__).with_name("scenes.toml"))
 
-SCENES = FILE.scenes
-"""Descriptions of the scenes, by name; each lasts 600 frames or more."""
+SCENES = FILE.scenes  # descriptions of the scenes, by name; each lasts 600 frames or more
 
 build_scene = FILE.build
 

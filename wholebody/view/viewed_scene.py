@@ -110,5 +110,4 @@ def place_of(scene: ViewedScene, state: State, name: str) -> pin.SE3 | None:
     return None
 
 
-ViewedScene: TypeAlias = Scene | ViewedAssembly | ViewedWorld
-"""What the viewer shows."""
+ViewedScene: TypeAlias = Scene | ViewedAssembly | ViewedWorld  # what the viewer shows

@@ -57,8 +57,7 @@ class Run:
         return judge(self.track, self.postures)
 
 
-Runs = Mapping[str, Sequence[Run]]
-"""The repeats of each tool, by its name."""
+Runs = Mapping[str, Sequence[Run]]  # the repeats of each tool, by its name
 
 
 def measure(

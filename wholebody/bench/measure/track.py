@@ -27,8 +27,7 @@ VARIANTS = ("free", "contact", "alone")
 
 
 given = numbers("step")
-SETTING = given.told
-"""What every tool is told of a reach; see the end of `sets.toml`."""
+SETTING = given.told  # what every tool is told of a reach; see the end of `sets.toml`
 
 
 @dataclass(frozen=True)

@@ -251,8 +251,7 @@ class Judge:
         return depth
 
 
-Path = Sequence[tuple[float, Array]]
-"""Shares of a frame, and postures (nq,)."""
+Path = Sequence[tuple[float, Array]]  # shares of a frame, and postures (nq,)
 
 DT = 1.0 / 60.0
 SHAPES = {

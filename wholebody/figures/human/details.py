@@ -20,8 +20,7 @@ from wholebody.figures.tables import table
 _ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _AHEAD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
-SPREAD = 3
-"""Number of the piece of the thigh that is the flesh that spreads on a seat."""
+SPREAD = 3  # number of the piece of the thigh that is the flesh that spreads on a seat
 
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:

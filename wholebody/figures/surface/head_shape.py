@@ -95,5 +95,4 @@ def _solids(name: str) -> list[Field]:
     return made
 
 
-PLACES = {"ball": 1, "ellipsoid": 1, "cone": 2}
-"""How many of the numbers of each kind of solid are places."""
+PLACES = {"ball": 1, "ellipsoid": 1, "cone": 2}  # how many of the numbers of each kind of solid are places

@@ -17,8 +17,7 @@ from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.nets import Triangles, coarsened, triangles
 from wholebody.figures.surface.person_shape import COLORS, HALVES, PersonShape
 
-BONES_EACH = 4
-"""Bones that move a vertex: as many as a page's shader takes."""
+BONES_EACH = 4  # bones that move a vertex: as many as a page's shader takes
 
 
 class Part(NamedTuple):

@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.figures.surface.fields import Field, intersection
 
-BLOCK = 4
-"""Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""
+BLOCK = 4  # cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone
 
-STEEPEST = 1.8
-"""Largest slope of a field near its surface; of a distance it is 1."""
+STEEPEST = 1.8  # largest slope of a field near its surface; of a distance it is 1
 
 
 class Triangles(NamedTuple):

@@ -183,8 +183,7 @@ def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:
     model.velocityLimit, model.effortLimit = velocity, effort
 
 
-SAMPLES = 400
-"""Number of random postures for finding pairs that always overlap."""
+SAMPLES = 400  # number of random postures for finding pairs that always overlap
 
 
 def urdf_figure(

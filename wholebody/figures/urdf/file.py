@@ -19,8 +19,7 @@ from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_robot, unique_names
 from wholebody.geometry.pieces import LARGEST
 
-EXTENSION = "wholebody"
-"""Name of the element of our extension; see `wholebody.figures.urdf.extension`."""
+EXTENSION = "wholebody"  # name of the element of our extension; see `wholebody.figures.urdf.extension`
 
 
 class LinkVisual(NamedTuple):

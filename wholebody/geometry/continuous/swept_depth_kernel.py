@@ -252,8 +252,7 @@ def _curvature(
     return total
 
 
-Outline: TypeAlias = tuple[Array, Indices, Array, Array]
-"""`points`, `first_point`, `radius` and `radii` of `Shapes`."""
+Outline: TypeAlias = tuple[Array, Indices, Array, Array]  # `points`, `first_point`, `radius` and `radii` of `Shapes`
 
 
 @compiled(inner=True)

@@ -24,8 +24,7 @@ from wholebody.geometry.placement import steady
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 
-JOINT = "joint "
-"""Before the name of a joint, in the name of its node."""
+JOINT = "joint "  # before the name of a joint, in the name of its node
 
 UPWARD: Array = np.eye(4)
 UPWARD[:3, :3] = UP["y"].T

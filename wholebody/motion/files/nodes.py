@@ -36,11 +36,9 @@ def angles_about(turned: Rotation, axes: Array) -> Array:
     return found
 
 
-SAME_PLACE = 1e-9
-"""Metres between joints that are at one place."""
+SAME_PLACE = 1e-9  # metres between joints that are at one place
 
-OFF = 1e-4
-"""Metres and radians by which a skeleton may differ from a figure and still be the figure's own."""
+OFF = 1e-4  # metres and radians by which a skeleton may differ from a figure and still be the figure's own
 
 
 @dataclass(frozen=True)

@@ -36,14 +36,12 @@ from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
 from wholebody.scene.scene import Scene
 
-LENGTH = 0.1
-"""Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
+LENGTH = 0.1  # metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support
 
 TOLERATED = 5e-4
 """Metres, see `LENGTH`: what a frame whose postures are free may be beyond its bounds without being changed."""
 
-NEAR = 0.05
-"""Metres: a load that is farther from its bound has no row; what passes unseen has one in the next step."""
+NEAR = 0.05  # metres: a load that is farther from its bound has no row; what passes unseen has one in the next step
 
 
 class Defects(NamedTuple):

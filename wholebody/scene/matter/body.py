@@ -98,8 +98,7 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
 )
 """The materials of table 1."""
 
-DEFAULT = MATERIALS["wood"]
-"""Of things that say nothing of theirs."""
+DEFAULT = MATERIALS["wood"]  # of things that say nothing of theirs
 
 
 def material(value: object, what: str) -> Material:

@@ -17,8 +17,7 @@ from wholebody.figures.urdf.writing import exact
 from wholebody.geometry.pieces import hull_triangles, swept_points
 from wholebody.geometry.placement import placement
 
-Make = Callable[[int, np.random.Generator], tuple[str, wb.Shape]]
-"""Makes the thing of a number: its kind and its shape."""
+Make = Callable[[int, np.random.Generator], tuple[str, wb.Shape]]  # makes the thing of a number: its kind and its shape
 
 
 def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3, exact: bool = False) -> float:
