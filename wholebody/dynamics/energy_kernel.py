@@ -164,7 +164,6 @@ def settle(
 def _find_jammed(
     points: Indices, impulse: Array, off: Mask, bodies: Bodies, root: Indices, kind: Indices, jammed: Mask
 ) -> None:
-    """See `restrain`."""
     unsolved = np.zeros(len(root), dtype=np.bool_)
     for c in range(len(off)):
         if impulse[c, 0] > 0.0 and off[c]:

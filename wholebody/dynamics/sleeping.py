@@ -110,7 +110,6 @@ class Sleepers:
             self.wake(finder.near(state.bodies.position, state.bodies.rotation, margin, put), put)
 
     def _forget(self) -> None:
-        """Forget what touched bodies that are awake."""
         kept = self._asleep()[self._touched[:, 0]]
         if not kept.all():
             self._touched, self._position, self._rotation = (

@@ -188,7 +188,6 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str,
 
 
 def _meet(first: Any, there: coal.Transform3s, second: Any, at: coal.Transform3s) -> bool:
-    """Whether two convex shapes overlap."""
     return bool(coal.collide(first, there, second, at, coal.CollisionRequest(), coal.CollisionResult()))
 
 

@@ -148,7 +148,6 @@ def archived(model: pin.Model) -> tuple[Any, ...]:
 
 
 def _restored(archive: str, limits: dict[str, Array], followers: list[_Follower]) -> pin.Model:
-    """A model that was pickled."""
     model = pin.Model()
     model.loadFromString(archive)
     for name, values in limits.items():

@@ -167,7 +167,6 @@ def _stand_alone(problem: Problem, postures: Iterable[Array]) -> bool:
 
 
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
-    """The start, and random postures (nq,)."""
     state, rng = problem.scene.state(problem.start), np.random.default_rng(seed)
     others = throughout(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
     return chain([problem.scene.figure.clamp(problem.start)], others)

@@ -55,7 +55,6 @@ class Force(Checked):
 
 
 def _forces(value: object, where: str) -> tuple[Force, ...]:
-    """Forces as a tuple."""
     listed = checks.listed(value, where, "[wb.Force('right_palm', (0, 0, -100))]")
     return tuple(checks.instance(one, Force, where, "give wb.Force('right_palm', (0, 0, -100))") for one in listed)
 

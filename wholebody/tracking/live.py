@@ -222,7 +222,6 @@ class LiveDrag:
         return float(np.linalg.norm(self.place_at(q, self.taken) - target))
 
     def _remember(self) -> None:
-        """Note what `undo` goes back to."""
         self._undo.append(self._subject.remembered(self.q))
         del self._undo[:-100]  # postures that are remembered
 

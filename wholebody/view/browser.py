@@ -223,7 +223,6 @@ class Browser:
     # ---- the protocol: JSON messages, each ended by a zero byte
 
     def _call(self, method: str, **params: Any) -> dict[str, Any]:
-        """The page's answer."""
         if self._session is None:
             self._attach()
         return self._ask(method, self._session, **params)
@@ -246,7 +245,6 @@ class Browser:
         return self._number
 
     def _answer(self, method: str, number: int) -> dict[str, Any]:
-        """Wait for the answer to a message."""
         end = time.monotonic() + TIMEOUT
         while number not in self._answers:
             self._receive(end)
@@ -264,7 +262,6 @@ class Browser:
         )
 
     def _receive(self, end: float) -> None:
-        """Read the next messages of the browser."""
         if not select.select([self._in], [], [], max(end - time.monotonic(), 0.0))[0]:
             raise BrowserError(f"the browser did not answer within {TIMEOUT:g} s")
         chunk = os.read(self._in, 1 << 20)

@@ -77,7 +77,6 @@ def _hair(female: bool) -> Field:
 
 
 def _part(name: str) -> Field:
-    """All solids of a part of `head.toml`."""
     return union(_solids(name))
 
 

@@ -157,7 +157,6 @@ def _slopes(field: Field, points: Array, values: Array) -> Array:
 
 
 def _moved(field: Field, vertices: Array, cell: float) -> Array:
-    """The vertices moved to the surface."""
     start, points = vertices, vertices
     # steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the
     # error

@@ -216,7 +216,6 @@ def urdf_figure(
 
 
 def _described(robot: Robot, path: Path) -> Robot:
-    """The robot with what its SRDF says."""
     known = read_srdf(path, robot.model, robot.links)
     owners = [robot.model.frames[piece.parentFrame].name for piece in robot.geometry.geometryObjects]
     return with_values(
