@@ -167,8 +167,7 @@ class Child:
         code = self._process.wait()
         self._output.seek(0)
         lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
-        # most characters kept of the last line that a process wrote
-        said = lines[-1].strip()[:200] if lines else ""
+        said = lines[-1].strip()[:200] if lines else ""  # most characters kept of the last line that a process wrote
         self.close()
         return EndedError(code, said)
 

@@ -17,8 +17,7 @@ from wholebody.bench.rows import Row, shown
 def console(least: int = 0) -> Console:
     """The output, whose lines have `least` letters or more, and where it is no terminal enough for all tables."""
     made = Console()
-    # letters of a line in a file or a log
-    made.width = max(made.width, least, 0 if made.is_terminal else 140)
+    made.width = max(made.width, least, 0 if made.is_terminal else 140)  # letters of a line in a file or a log
     return made
 
 

@@ -161,8 +161,7 @@ def _metacarpal(size: Dimensions, side: str) -> pin.SE3:
     radial, palmar = math.radians(40.0), math.radians(30.0)
     along = np.array([math.sin(radial), -sign * math.sin(palmar), -math.cos(radial)])
     along /= np.linalg.norm(along)
-    # The thumb bends across the palm, towards the little finger.
-    bend = np.array([-0.8, -sign * 0.6, 0.0])
+    bend = np.array([-0.8, -sign * 0.6, 0.0])  # the thumb bends across the palm, towards the little finger
     bend -= along * (along @ bend)
     y = -sign * bend / np.linalg.norm(bend)
     return pin.SE3(np.column_stack([np.cross(y, -along), y, -along]), _knuckle(size, "thumb"))

@@ -195,8 +195,7 @@ class _Parting:
         """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""
         best: _Try | None = None
         since = 0
-        # corrections from one start; ordinary overlaps take three to ten.
-        for _ in range(60):
+        for _ in range(60):  # corrections from one start; ordinary overlaps take three to ten
             near = self.contacts(q, APART)
             left = tuple(np.sort(near.number[near.distance <= 0.0]).tolist())
             found = _Try(q, left, float(np.minimum(near.distance, 0.0).sum()))

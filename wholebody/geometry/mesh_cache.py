@@ -135,8 +135,7 @@ def _read(path: Path) -> Any:
         path.unlink(missing_ok=True)
         return None
     with suppress(OSError):
-        # Least seconds between two updates of an entry's time of use.
-        if time.time() - path.stat().st_mtime > 3600.0:
+        if time.time() - path.stat().st_mtime > 3600.0:  # least seconds between two updates of an entry's time of use
             os.utime(path)
     return found
 

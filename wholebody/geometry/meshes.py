@@ -165,8 +165,7 @@ def _bytes_of_stl(path: Path) -> int | None:
     """How many bytes a binary STL has by its own count of triangles; None for other files."""
     with path.open("rb") as file:
         head = file.read(512)
-    # some binary ones begin with "solid" too
-    text = head.lstrip()[:5].lower() == b"solid" and b"\0" not in head
+    text = head.lstrip()[:5].lower() == b"solid" and b"\0" not in head  # some binary ones begin with "solid" too
     if path.suffix.lower() != ".stl" or len(head) < 84 or text:
         return None
     return 84 + 50 * int.from_bytes(head[80:84], "little")

@@ -344,8 +344,7 @@ def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure,
     weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
     if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
         rows.append(place["hips"])
-        # weight of the place of the hips; 1 is that of a bone
-        weights.append(0.3)
+        weights.append(0.3)  # weight of the place of the hips; 1 is that of a bone
     else:  # what is known says where it is
         rows += [place[role] for role in points]
         weights += [1.0] * len(points)

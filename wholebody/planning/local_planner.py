@@ -149,8 +149,7 @@ class Geodesics:
         return path, blocked
 
     def _parts(self, motion: Array) -> int:
-        # rad, m: length of a part of a motion
-        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))
+        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))  # rad, m: length of a part of a motion
 
     def _seen(self, q: Array) -> Seen | None:
         """What is seen at a posture (nq,); None where a pair is nearer than is required, or a constraint is missed."""

@@ -158,8 +158,7 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
     free = places(model, path)
     wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path.copy()
     blocked, anew = np.zeros(len(path) - 1, dtype=bool), np.ones(len(path), dtype=bool)
-    # mixtures of the filtered path and the free one; more = smoother beside things, and later
-    for _ in range(8):
+    for _ in range(8):  # mixtures of the filtered path and the free one; more = smoother beside things, and later
         share[[0, -1]] = 0.0
         mixed = _postures(model, path, free + share[:, None] * (wide - free))
         for part in _runs(anew):

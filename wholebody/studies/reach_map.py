@@ -51,8 +51,7 @@ class Try(NamedTuple):
     reached: bool  # whether a posture was found
     inside: bool  # whether the place contradicts the constraints, so that it was not searched
     left: float  # distance to the nearest posture that was found, metres
-    # whether the search says that there is nothing nearer, so that places within that distance are left out
-    sure: bool
+    sure: bool  # whether the search says that there is nothing nearer, so that places within that distance are left out
     measure: float  # weighted sum of the measures at the posture
     q: Array  # (nq,) the posture
 

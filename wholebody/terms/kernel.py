@@ -293,8 +293,7 @@ def _box(limits: Array, places: Integers, boxes: Array, q: Array, box: Array) ->
         box[0, places[e, 1]] = low * limits[e, 2] if low < 0.0 else low
         box[1, places[e, 1]] = high * limits[e, 2] if high > 0.0 else high
     for e in range(0, len(boxes), 2):
-        # a joint out of its limits comes back no faster than the bound lets it
-        for v in range(box.shape[1]):
+        for v in range(box.shape[1]):  # a joint out of its limits comes back no faster than the bound lets it
             low, high = boxes[e, v], boxes[e + 1, v]
             box[0, v] = min(max(box[0, v], low), high)
             box[1, v] = min(max(box[1, v], low), high)

@@ -364,8 +364,7 @@ class LivePage:
                 place = at[owner] * scene.objects[owner].placement.actInv(place)
             values[number] = pin.SE3ToXYZQUAT(place)
         with self.server.atomic():
-            # each costs viser more than the physics of a piece
-            moved = ~(np.abs(values - self._sent) <= STILL)
+            moved = ~(np.abs(values - self._sent) <= STILL)  # each costs viser more than the physics of a piece
             for number in np.flatnonzero(moved[:, :3].any(axis=1)).tolist():
                 self._pieces[number].position = self._sent[number, :3] = values[number, :3]
             for number in np.flatnonzero(moved[:, 3:].any(axis=1)).tolist():

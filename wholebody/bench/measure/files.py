@@ -137,8 +137,7 @@ def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator
 
 
 def _thinned(motion: SkeletonMotion) -> SkeletonMotion:
-    # recordings at more than twice 60 Hz are subsampled
-    every = max(1, round(1.0 / (motion.dt * 60.0)))
+    every = max(1, round(1.0 / (motion.dt * 60.0)))  # recordings at more than twice 60 Hz are subsampled
     parts = motion.rotations[::every], motion.positions[::every]
     return SkeletonMotion(motion.names, motion.parents, motion.offsets, *parts, motion.dt * every, motion.name)
 

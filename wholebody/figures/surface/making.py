@@ -169,8 +169,7 @@ def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.i
 
     whole = cuts == 0
     made, owners = [faces[whole]], [theirs[whole, 0]]
-    # Two segments: the corner that is alone comes first.
-    two, of_two = faces[cuts == 2], theirs[cuts == 2]
+    two, of_two = faces[cuts == 2], theirs[cuts == 2]  # two segments: the corner that is alone comes first
     alone = np.argmax([(of_two != of_two[:, k : k + 1]).sum(axis=1) == 2 for k in range(3)], axis=0)
     order = (alone[:, None] + np.arange(3)) % 3
     v0, v1, v2 = np.take_along_axis(two, order, axis=1).T
@@ -178,8 +177,7 @@ def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.i
     m1, m2 = cut(v0, v1), cut(v0, v2)
     made += [np.stack(corners, axis=1) for corners in ((v0, m1, m2), (m1, v1, v2), (m1, v2, m2))]
     owners += [mine, rest, rest]
-    # Three segments: a vertex in the middle.
-    three, of_three = faces[cuts == 3], theirs[cuts == 3]
+    three, of_three = faces[cuts == 3], theirs[cuts == 3]  # three segments: a vertex in the middle
     middle = len(bound.vertices) + np.arange(len(three))
     bound = bound.with_means(three, np.full(three.shape, 1.0 / 3.0))
     for k in range(3):

@@ -59,8 +59,7 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
     """Return fewer triangles (m, 3) of a closed surface, which stays closed (Rossignac and Borrel 1993)."""
     vertices, faces = surface.vertices, surface.faces
     edges = vertices[faces] - vertices[np.roll(faces, 1, axis=1)]
-    # 2 saves no more time and loses eyes and lips.
-    cell = 1.6 * np.median(np.linalg.norm(edges, axis=-1))
+    cell = 1.6 * np.median(np.linalg.norm(edges, axis=-1))  # 2 saves no more time and loses eyes and lips
     across = np.cross(edges[:, 1], edges[:, 2])
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
     # cosine of the angle between a triangle and the normal at its corner, below which the corner is on a sharp

@@ -38,8 +38,7 @@ class UrdfFile(NamedTuple):
     inertials: dict[str, Element]  # link to its ``<inertial>`` element
     joints: tuple[UrdfJoint, ...]  # in the order of the file
     shapes: tuple[LinkShape, ...]  # collision shapes in the order of the file
-    # link to red, green, blue, alpha of the first of its visuals that has a colour
-    colors: dict[str, Color]
+    colors: dict[str, Color]  # link to red, green, blue, alpha of the first of its visuals that has a colour
     visuals: tuple[LinkVisual, ...]  # what the file wants drawn, without what is wholly transparent or cannot be read
     extension: Element | None  # the element `EXTENSION`, or None
     notes: tuple[str, ...]  # one sentence for each missing part that was filled in

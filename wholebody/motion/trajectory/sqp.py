@@ -114,8 +114,7 @@ class _Filter:
         self._little = self._little + 1 if left and small else 0
         if left and longest < 0.9 * self.radius:
             self.penalty = min(10.0 * self.penalty, SETTINGS.highest)
-        # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
-        if self._little >= 2:
+        if self._little >= 2:  # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
             self.radius = 0.5 * min(self.radius, longest)
         elif longest > 0.9 * self.radius and not self._little:
             self.radius = min(2.0 * self.radius, self._largest)
