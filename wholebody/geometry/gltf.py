@@ -30,15 +30,10 @@ Color: TypeAlias = tuple[float, float, float, float]
 
 
 class GltfDocument:
-    """A file.
+    """A file: what its JSON says, `tree`, and of its nodes names and parents (k,), -1 for those on top.
 
-    Attributes:
-        tree: what its JSON says.
-        names: of the nodes; those without one, or with that of an earlier node, have a number.
-        parents: (k,) of the nodes, -1 for those on top.
-
-    Raises:
-        FileFormatError: it is no glTF 2, it is cut off, or its nodes are no trees.
+    Nodes without a name, or with that of an earlier node, have a number. FileFormatError for what is no glTF 2, is cut
+    off, or has nodes that are no trees.
     """
 
     def __init__(self, path: Path) -> None:

@@ -30,16 +30,9 @@ FEW = 1000
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
     """Convex hull of points (n, 3), metres, with its origin at the centre of the smallest sphere around it.
 
-    Args:
-        points: at least four; duplicates and inner points are dropped.
-        what: name of the points, for messages.
-        vertices: (most, few): a hull with more than `most` vertices is replaced by one around it that has no more than
-            `few`, at least 8. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a
-            vertex, is replaced.
-
-    Raises:
-        InputError: not (n, 3), not finite, fewer than four different points, or thinner than `SMALLEST` in some
-            direction (flat and collinear points too).
+    `vertices` (most, few): a hull with more than `most` vertices is replaced by one around it with at most `few`, 8 or
+    more. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a vertex, is replaced.
+    InputError for fewer than four different points, or what is thinner than `SMALLEST` in some direction.
     """
     cloud = check_points(points, what)
     if len(cloud) < FEW:

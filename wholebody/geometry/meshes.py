@@ -33,15 +33,11 @@ class EmptyMeshError(FileFormatError):
 
 
 def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
-    """Read all triangles of an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file, every object at its placement.
+    """Vertices (n, 3) and faces (m, 3) of an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file, every object placed.
 
-    Returns:
-        vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is converted to
-        metres, and its up axis is ignored, as in the tools of ROS.
-
-    Raises:
-        FileFormatError: missing, empty, of another kind, damaged, without triangles, or not finite.
-        MissingPackageError: for a COLLADA file, pycollada is not installed.
+    They have the file's units and axes; a COLLADA file that names its unit is converted to metres, and its up axis is
+    ignored, as in the tools of ROS. FileFormatError for a file without triangles, or damaged; MissingPackageError for
+    COLLADA without pycollada.
     """
     path = Path(path)
     if (bent := _bent(path)) is not None:

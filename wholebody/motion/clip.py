@@ -352,11 +352,7 @@ def column_name(figure: Figure, column: int) -> str:
 
 
 def thing_tracks(given: Mapping[str, Iterable[PlacementLike]], frames: int, what: str) -> dict[str, Array]:
-    """Placements (n, 7) of things by name, checked; `what` names the input in messages.
-
-    Raises:
-        InputError: another number of placements than frames, or one that cannot be read; the frame is named.
-    """
+    """Placements (n, 7) of things by name, or an InputError that names `what` and the frame."""
     found = {}
     for name, track in given.items():
         checks.text(name, f"{what}: the name of a thing")

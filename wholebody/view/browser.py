@@ -57,15 +57,9 @@ class Browser:
     """
 
     def __init__(self, size: tuple[int, int] = (960, 720), page: str = "") -> None:
-        """Start Chromium.
+        """Start Chromium with a page of a width and height, pixels, that opens the HTML of a `Viewer`; "" for none.
 
-        Args:
-            size: width and height of the page, pixels.
-            page: HTML of the page of a `Viewer` that it opens, as a file without network; "" for none.
-
-        Raises:
-            MissingPackageError: there is no Chromium.
-            BrowserError: it cannot be started.
+        MissingPackageError without Chromium, BrowserError where it cannot be started.
         """
         executable = find_chromium()
         if executable is None:

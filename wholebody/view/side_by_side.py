@@ -30,14 +30,8 @@ SHORT = 0.01  # m: shorter bones are not drawn
 def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scene, title: str) -> Viewer:
     """A viewer that plays motions side by side, from the left to the right as they are given.
 
-    Args:
-        motion: the recorded skeleton, on the left; None for clips alone.
-        clips: name to a clip, of as many frames as the skeleton.
-        scene: what the figures carry, and what stands around, which every motion gets.
-        title: of the page.
-
-    Raises:
-        InputError: motions of other numbers of frames, or two names that differ in "/" and " " alone.
+    The recorded skeleton, if any, is on the left; clips have as many frames, and get what the scene's figures carry
+    and what stands around. InputError for other frames, or two names that differ in "/" and " " alone.
     """
     _check(motion, clips, scene)
     wide = max(APART, 0.5 + max(_way(clip)[1] for clip in clips.values()))

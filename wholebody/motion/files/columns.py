@@ -30,10 +30,8 @@ UNIT = re.compile(r"\s*[\[(](deg|degrees|°|rad|radians)[\])]$|[\s_](deg|degrees
 def write(motion: Motion, path: Path, *, bare: bool = False) -> Path:
     """Write time, the seven values of a free root, and the joints in radians; turns without limits are angles.
 
-    `bare` leaves out the line of names and the times, as Unitree's LAFAN1 files are.
-
-    Raises:
-        InputError: a joint has several degrees of freedom, or the file cannot be written.
+    `bare` leaves out the line of names and the times, as Unitree's LAFAN1 files are. InputError for a joint of several
+    degrees of freedom.
     """
     figure, q = motion.figure, motion.q
     if len(figure.joint_values(figure.neutral)) != len(figure.joints):
