@@ -275,16 +275,10 @@ class Points(NamedTuple):
         directions: Array,
         time: float,
     ) -> None:
-        """Add what the things at the first points are.
+        """Add what the things at the first points are, whose both `owners` (k,) have names.
 
-        Args:
-            surfaces: what happens where both touch.
-            engine: has the bodies.
-            moved: things to their placements before and after the step.
-            owners: (k,) both that touch, by name.
-            place: (k, 3) points.
-            directions: (k, 3, 6) rows that take a twist at the origin to velocities along the axes of each point.
-            time: of the step, seconds.
+        `moved`: things to their placements before and after the step; `place` (k, 3) points; `directions` (k, 3, 6)
+        take a twist at the origin to velocities along the axes of each point; `time` of the step, seconds.
         """
         places = {name: 6 * b for b, name in enumerate(self.bodies)}
         for c, both in enumerate(owners):

@@ -151,14 +151,9 @@ def _split(
 ) -> tuple[float, float]:
     """Steps of the alternating direction method: by how much the impulses broke the program, and the laws of contact.
 
-    Args:
-        mobility: (3 m, 3 m).
-        weight: (3 m,) of what the laws of contact change.
-        rest: (3 m,) velocities without impulses, less the targets.
-        friction: (m,).
-        impulse: (3 m,) the impulses; they obey the laws of contact, and change in place.
-        dual: (3 m,) the velocities at which these are solved, likewise.
-        most: steps.
+    `mobility` (3 m, 3 m); `weight` (3 m,) of what the laws of contact change; `rest` (3 m,) velocities without
+    impulses, less the targets; `impulse` (3 m,) obeys the laws, `dual` are the velocities at which these are solved:
+    both change in place.
     """
     size = len(rest)
     root, found, free, broken, moved = mobility.copy(), np.empty(size), np.empty(size), 0.0, 0.0

@@ -18,17 +18,9 @@ def screen(
 ) -> int:  # fmt: skip
     """Bound the distances after a motion from below, and list the pairs that may overlap at its end or on its way.
 
-    Args:
-        place: (n, 4, 3) where the pieces are after the motion; see `Contacts.placements`.
-        table: `pairs`, `reach` and `half` of the pair table.
-        speed: (p,) by how much a pair can have come nearer during the motion, metres.
-        before: (p,) lower bounds of the distances before it.
-        after: (p,) room for those after it: from the motion, from spheres and from boxes along the world's axes.
-        extent: (n, 3) room for the sizes of the boxes.
-        index: (p,) room for the pairs of the answer.
-
-    Returns:
-        How many pairs there are.
+    `place` (n, 4, 3): the pieces after it. `speed` (p,): by how much a pair can have come nearer, metres. `before` and
+    `after` (p,): bounds before it, and room for those after it, from the motion, spheres and boxes of sizes `extent`
+    (n, 3); `index` (p,) has room for the answer, whose length is returned.
     """
     pairs, reach, half = table
     bound_by_boxes(place, half, extent)
