@@ -123,25 +123,19 @@ class Derivatives(NamedTuple):
 
 
 class InverseDynamics:
-    """Loads of frames of one figure, with mass, on feet that may stand, and on other joints that may touch things.
-
-    Attributes:
-        feet: names of the segments or frames that may stand; none for a root that is fixed.
-        joints: of the feet, and after them those that touch.
-        weight: N.
-    """
+    """Loads of frames of one figure, with mass, on feet that may stand, and on other joints that may touch things."""
 
     def __init__(self, figure: Figure, feet: Sequence[str], friction: float, touching: Sequence[int] = ()) -> None:
         one_figure(figure, "dynamics: the figure")
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
-        self.feet = tuple(feet)
+        self.feet = tuple(feet)  # names of the segments or frames that may stand; none for a root that is fixed
         joints = [int(figure.model.frames[figure.frame_id(foot)].parentJoint) for foot in self.feet]
         self._soles = [pieces_on(figure, joint) for joint in joints]
         for foot, joint, pieces in zip(self.feet, joints, self._soles, strict=True):
             if joint == 0 or not pieces:
                 raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
-        self.joints = [*joints, *touching]
-        self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))
+        self.joints = [*joints, *touching]  # of the feet, and after them those that touch
+        self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))  # N
         self.free = figure.root == "free"
 
     def stand(self, q: Array, feet: Sequence[bool], touches: Touches | None = None) -> Stand:

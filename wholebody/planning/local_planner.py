@@ -49,12 +49,7 @@ class Seen(NamedTuple):
 
 
 class Geodesics:
-    """Geodesics of Pinocchio, for figures that hold nothing.
-
-    Attributes:
-        shares: (nv,) by which freedoms count in the distance of two postures, as far as they move a point.
-        partial: whether one joint may move in another way than before, and all others as they did.
-    """
+    """Geodesics of Pinocchio, for figures that hold nothing."""
 
     searches: ClassVar[int] = 12  # how many paths are looked for, of which the shortest counts; more = shorter, later
     samples: ClassVar[int] = 600  # of trees that look for a shorter path after the first; more = shorter paths, later
@@ -65,7 +60,7 @@ class Geodesics:
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
-        self.partial = True
+        self.partial = True  # whether one joint may move in another way than before, and all others as they did
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
@@ -91,6 +86,7 @@ class Geodesics:
         # as a piece sees another one that it does not carry, twice as much
         self._views = np.where(np.array(carried).reshape(-1, 2), 0.25, 0.5)
         levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        # shares: (nv,) by which freedoms count in the distance of two postures, as far as they move a point
         self.shares = levers / levers.max()
 
     def admit(self, q: Array) -> None:

@@ -54,9 +54,6 @@ class RRTConnect:
     So branches towards samples go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008):
     a root is pulled to its place in a sample, and all else gives way, which leads out of narrow places. Paths
     without steps are shorter.
-
-    Attributes:
-        samples: how many they were extended towards.
     """
 
     def __init__(
@@ -66,7 +63,7 @@ class RRTConnect:
         self._local, self._slides, self._every = local, slides, every
         self._trees = [Tree(model, start, local.shares), Tree(model, start, local.shares)]
         self._trees[0].add(start)
-        self.samples = 0
+        self.samples = 0  # how many they were extended towards
 
     def add_end(self, end: Array) -> None:
         """Add a posture (nq,) at which the motion may end."""

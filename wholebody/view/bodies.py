@@ -32,19 +32,14 @@ class Skinned(NamedTuple):
 
 
 class Skin:
-    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body.
-
-    Attributes:
-        surface: of the figure.
-        places: of each bone the joint that carries it, and its placement (4, 4) there.
-        joints: names of the joints that carry bones.
-    """
+    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body."""
 
     def __init__(self, surface: Surface, figure: Any, at: Array) -> None:
         """Find the bones of a figure; `at` (4, 4) is where its world is."""
-        self.surface = surface
+        self.surface = surface  # of the figure
+        # places: of each bone the joint that carries it, and its placement (4, 4) there
         self.places = surface.attached(figure, at)
-        self.joints = tuple(dict.fromkeys(name for name, _ in self.places))
+        self.joints = tuple(dict.fromkeys(name for name, _ in self.places))  # names of the joints that carry bones
 
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the surface at a node, moved by the nodes of its joints; in a colour, or each patch in its own."""

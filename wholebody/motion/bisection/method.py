@@ -121,12 +121,6 @@ class Recursion:
     """The recursion of figure 3.2 of the thesis: predict a middle frame, interpolate beside it, go into both halves.
 
     Groups end at frames that were predicted, so it ends after at most one prediction a frame.
-
-    Attributes:
-        q: (n, nq) the present postures.
-        bad: (n,) which of them overlap.
-        keys: frames that were predicted and are free, and evaluation points; they do not change again.
-        stuck: frames whose prediction failed.
     """
 
     def __init__(self, predictor: Predictor, settings: Bisection) -> None:
@@ -138,11 +132,12 @@ class Recursion:
         self._planes = usual if settings.planes is None else settings.planes
         self._short = 25 if settings.method == "qp" else None  # nine in ten predictions take at most 20 programs
         self._state, self._whole = State(run.scene.model), True
-        self.q = np.array(run.terms.q)
-        self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])
+        self.q = np.array(run.terms.q)  # (n, nq) the present postures
+        self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])  # (n,) which of them overlap
         self._at_first = max(1, int(self.bad.sum()))
+        # keys: frames that were predicted and are free, and evaluation points; they do not change again
         self.keys: set[int] = set()
-        self.stuck: set[int] = set()
+        self.stuck: set[int] = set()  # frames whose prediction failed
 
     def free(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
         """Free the evaluation points and both ends, then all between; `whole`: also after a frame that is stuck."""

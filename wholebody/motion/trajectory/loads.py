@@ -45,17 +45,11 @@ NEAR = 0.05  # metres: a load that is farther from its bound has no row; what pa
 
 
 class Defects(NamedTuple):
-    """By how much loads that `wb.motion.torques` measures are more than those of the rows; see `ClipLoads.corrected`.
+    """By how much measured loads (`wb.motion.torques`) are more than those of the rows; see `ClipLoads.corrected`."""
 
-    Attributes:
-        torque: (n, nv) N m.
-        place: (n, 2) of the zero moment point, metres.
-        pressed: (n,) whether the measurement says where the zero moment point is; see `LIGHT`.
-    """
-
-    torque: Array
-    place: Array
-    pressed: Mask
+    torque: Array  # (n, nv) N m
+    place: Array  # (n, 2) of the zero moment point, metres
+    pressed: Mask  # (n,) whether the measurement says where the zero moment point is; see `LIGHT`
 
 
 class LoadBounds(NamedTuple):

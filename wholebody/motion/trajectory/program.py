@@ -25,16 +25,11 @@ ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; th
 
 
 class Limits(NamedTuple):
-    """What every deviation keeps to.
+    """What every deviation keeps to."""
 
-    Attributes:
-        lower, upper: (n, nv) limits of joints, and of frozen ones; infinite where there is none.
-        slowest, fastest: (n - 1, nv) bounds on the change of the deviation from a frame to the next.
-    """
-
-    lower: Array
+    lower: Array  # and upper: (n, nv) limits of joints, and of frozen ones; infinite where there is none
     upper: Array
-    slowest: Array
+    slowest: Array  # and fastest: (n - 1, nv) bounds on the change of the deviation from a frame to the next
     fastest: Array
 
     @classmethod
