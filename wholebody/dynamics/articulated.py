@@ -183,7 +183,7 @@ class Articulated:
 
     def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
         """The wrenches of a step without its impacts with the figure, which the next step has at its start."""
-        # To the engine the figure weighs without end: what it threw back would bring energy from nowhere.
+        # To the engine it is infinitely heavy, and would bring energy; alternating blows are taken back to `most` [J].
         wrenches, engine = dict(frame.wrenches), self._engine
         met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
         met += [(second, first, -impulse, point) for first, second, impulse, point in met]

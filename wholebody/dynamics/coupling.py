@@ -162,7 +162,7 @@ class PushedContacts:
 
 
 def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Surface) -> Array | None:
-    """Impulse (3,) on B [N s], equation 9 with friction of 10, of approach `relative` (3,); None if they part."""
+    """Impulse (3,) on B [N s] by equations 9 and 10, for a velocity `relative` (3,) to A; None if they part."""
     # `normal` (3,) from A to B; `mobility` (3, 3): change of that velocity by an impulse on B, and its opposite on A
     approach, least = -float(normal @ relative), 1e-6  # m/s
     if approach <= least:

@@ -59,7 +59,7 @@ class LoadChange:
 
     @property
     def unsupported(self) -> Array:
-        """(m,) share of the weight that the ground lacks more than at most within 0.1 s before the change."""
+        """(m,) share of the weight that the ground lacks beyond the most that it lacked before within 0.1 s."""
         old, new = (np.linalg.norm(loads.missing[:, :3], axis=1) for loads in (self.before, self.after))
         reach, figure = max(1, round(0.1 / self.after.dt)), self.after.figure
         near = sliding_window_view(np.pad(old, reach), 2 * reach + 1).max(axis=1)

@@ -168,7 +168,7 @@ class Accommodation(Shown):
 
     def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
         """The dimension that orders people best (Mann and Whitney 1947), and a bound that parts them (Youden 1950)."""
-        # where both ends are, people are ordered by how far from the others' middle they are
+        # where both ends are left out, people are ordered by how far from the middle of the others they are
 
         def apart(name: str) -> float:
             left, kept = (np.array([self.dimensions[k][name] for k in who]) for who in (out, rest))
