@@ -791,7 +791,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "sight",
         Call(
             wb.ergonomics.sight,
-            {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5), "field": wb.ergonomics.FieldOfView()},
+            {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5)},
         ),
     )
     cone = {"horizontal": 0.5, "up": 0.5, "down": 0.5, "declination": 0.2}
@@ -810,7 +810,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Trajectory", Call(wb.motion.Trajectory, settings)
     bisection = {
         "evaluation": (0,), "buffer": 20.0, "least": 2, "interpolation": "linear", "planes": ("tool",), "frozen": (),
-        "room": 0.01, "method": "qp", "character": 0.2, "short": 5,
+        "room": 0.01, "method": "qp",
     }  # fmt: skip
     yield "Bisection", Call(wb.motion.Bisection, bisection)
     worn = {"name": "bag", "shape": wb.Sphere(0.1), "to": "link2", "at": at, "rests_on": ("link1",), "color": None}

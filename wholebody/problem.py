@@ -87,14 +87,11 @@ class Problem(checks.FixedAttributes):
     _plan: tuple[_Planned, TermPlan] | None
     """The terms as arrays, and the terms that they were made of; every solve begins with it."""
     _known: tuple[Goal, ...]
-    _joined: tuple[Constraint, ...]
-    """The goals that the defaults are of, and the constraints with these defaults."""
+    _joined: tuple[Constraint, ...]  # the goals that the defaults are of, and the constraints with these defaults
     _places: tuple[int, ...]
-    _rest: Array
-    """(nq,) the start that the problem was stated with, which the defaults are of."""
+    _rest: Array  # (nq,) the start that the problem was stated with, which the defaults are of
     _revision: int
-    _usual: tuple[Measure, ...] | None
-    """The measures by default; None where others were stated."""
+    _usual: tuple[Measure, ...] | None  # the measures by default; None where others were stated
 
     def __init__(
         self,

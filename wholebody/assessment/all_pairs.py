@@ -74,10 +74,7 @@ class AllPairs:
             self.least = float(self._found[:, 0].min(initial=np.inf))
 
     def shortfalls(self, q: Array, clearances: Array) -> tuple[Array, Array, Array]:
-        """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq), for clearances (k, pairs).
-
-        These are as in `move` and `ask`; coal is asked only for pairs that neither balls nor boxes separate.
-        """
+        """Joints (k, njoints, 4, 3), deepest overlap and shortfall (k,) at q (k, nq) for clearances (k, pairs)."""
         table, distances, depth, short = self._built.table, self._distances, *np.zeros((2, len(q)))
         joints = np.empty((len(q), self._built.model.njoints, 4, 3))
         placed = np.empty((len(q), *distances.placed.shape))
@@ -105,8 +102,7 @@ class AllPairs:
             return np.array([self._bounds.gaps(centre).copy() for centre in centres])
         (first, second), reach = self._built.table.pairs.T, self._built.table.reach
         away = centres[:, second] - centres[:, first]
-        gaps: Array = np.sqrt(np.einsum("kpi,kpi->kp", away, away)) - (reach[first] + reach[second])
-        return gaps
+        return np.asarray(np.sqrt(np.einsum("kpi,kpi->kp", away, away)) - (reach[first] + reach[second]))
 
     def ask(self, within: Array | float) -> None:
         """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all."""
@@ -139,8 +135,7 @@ class AllPairs:
 def _between_boxes(placed: Array, half: Array) -> Array:
     """Greatest gap (k,) along a world's axis between boxes of half sizes (k, 2, 3) at placements (k, 2, 4, 3)."""
     extent = np.einsum("ksji,ksj->ki", np.abs(placed[:, :, :3]), half)
-    gaps: Array = (np.abs(placed[:, 1, 3] - placed[:, 0, 3]) - extent).max(axis=1)
-    return gaps
+    return np.asarray((np.abs(placed[:, 1, 3] - placed[:, 0, 3]) - extent).max(axis=1))
 
 
 class _Balls:

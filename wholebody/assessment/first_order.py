@@ -236,11 +236,9 @@ def _row_space(rows: Array) -> Array:
 
 
 def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tuple[Array, Array]:
-    """Shares (m,) >= 0 of rows (m, n) whose sum is nearest to a right side (n,), and the rest (n,).
-
-    Lawson and Hanson 1974, "Solving least squares problems", chapter 23; scipy.optimize loads longer than a solve.
-    A row that is shorter than `INDEPENDENT` of its length (m,) counts as zero.
-    """
+    """Shares (m,) >= 0 of rows (m, n) whose sum is nearest to a right side (n,), and the rest (n,)."""
+    # Lawson and Hanson 1974, "Solving least squares problems", chapter 23; scipy.optimize loads longer than a solve.
+    # A row that is shorter than `INDEPENDENT` of its length (m,) counts as zero.
     norms = np.linalg.norm(rows, axis=1)
     counts = norms > INDEPENDENT * lengths
     scale = np.where(counts, norms, 1.0)

@@ -56,11 +56,8 @@ def run_batch(work: Iterable[Job], jobs: int = 1, cluster: str | None = None) ->
 def shared(
     items: Sequence[T], jobs: int, here: Callable[[T], Any], there: Callable[[list[T], bool], Job]
 ) -> Iterator[tuple[T, Any, EndedError | None]]:
-    """Do work in this process and in `jobs - 1` others, which start meanwhile; returns answers or errors.
-
-    `here` does one item, `there` makes the job that does several, or None if the process lacks something: it is asked
-    again with True. Where all is done before the others are ready, they go on for the next call.
-    """
+    """Do work in this process, `here` an item, and in `jobs - 1` others by jobs of `there`; answers or errors."""
+    # `there` gives None where the process lacks something, and is asked again with True
     left, alone = deque(items), deque[T]()  # items whose process ended are done again, one by one
     with _children(min(jobs, len(items)) - 1) as others:
         for child in others:
@@ -96,8 +93,7 @@ def shared(
                     yield from ((item, answer, None) for item, answer in zip(chunk, outcome.answer, strict=True))
 
 
-_ready = object()
-"""Name of a job by which a process gets ready."""
+_ready = object()  # name of a job by which a process gets ready
 
 _idle: dict[int, list[Child]] = {}
 """Processes that are kept for the next call, by the id of the process that began them: a fork has its own."""
@@ -208,11 +204,7 @@ def _client(address: str) -> AbstractContextManager[Any]:
         raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
 
     class Closed(Client):  # type: ignore[misc]
-        """A client that closes itself where it cannot start.
-
-        Left to the garbage collector, one whose address is wrong closes itself in any thread at any time: in that of
-        the next client's loop it blocks the start of that client, and at the end of Python it waits for 20 s.
-        """
+        """A client that closes itself where it cannot start: else it would block the start of the next one."""
 
         def start(self, **options: Any) -> None:
             try:

@@ -26,32 +26,24 @@ from wholebody.base.errors import ALIKE, InputError, UnknownNameError, either
 _T = TypeVar("_T")
 
 DOUBLE = np.dtype(np.float64)
-NUMERIC = "fiu"
-"""Kinds of numpy arrays that hold real numbers: floating, signed and unsigned."""
+NUMERIC = "fiu"  # kinds of numpy arrays that hold real numbers: floating, signed and unsigned
 
 FAR = 1e15  # values beyond this get no hint at a wrong unit
 SLIPS = {"m": {"millimetres": 1e-3, "centimetres": 1e-2}, "rad": {"degrees": math.pi / 180.0}, "kg": {"grams": 1e-3}}
 """Unit -> the units that people write by mistake, with their size in it."""
 
-TIME_STEP = (1e-6, 1e6)
-"""Least and greatest time step, seconds: beyond them velocities have no significant digits."""
-TIME_STEP_ASKED = "give one between 1e-6 and 1e6 s"
-"""The end of a message about a time step that is out of that range."""
+TIME_STEP = (1e-6, 1e6)  # least and greatest time step, seconds: beyond them velocities have no significant digits
+TIME_STEP_ASKED = "give one between 1e-6 and 1e6 s"  # the end of a message about a time step that is out of that range
 
-MOST_TURNED = 4.0 * math.pi
-"""Radians, two turns, beyond which degrees were probably meant."""
+MOST_TURNED = 4.0 * math.pi  # radians, two turns, beyond which degrees were probably meant
 
-FASTEST_TURN = 50.0
-"""Radians a second beyond which a limit was probably meant in degrees a second."""
+FASTEST_TURN = 50.0  # radians a second beyond which a limit was probably meant in degrees a second
 
-UNLIMITED = 1e4
-"""Radians, radians a second or metres from which on a limit stands for none: some files write 1e16."""
+UNLIMITED = 1e4  # radians, radians a second or metres from which on a limit stands for none: some files write 1e16
 
-LONGEST = 200
-"""Characters of a name or a title."""
+LONGEST = 200  # characters of a name or a title
 
-SHOWN_NAMES = 6
-"""Names that a list in a sentence has at most."""
+SHOWN_NAMES = 6  # names that a list in a sentence has at most
 
 _INSIDE = (str(Path(__file__).parents[1]) + os.sep, "<string>")  # the package's files, and code that dataclasses make
 _SHORT = Repr()
@@ -200,10 +192,7 @@ def listed(value: object, what: str, example: str) -> list[Any]:
 
 
 class FixedAttributes:
-    """Base of objects whose public attributes are decided when they are made.
-
-    Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks.
-    """
+    """Base of objects whose public attributes stay, but those in `_settable`, which `_checked_value` checks."""
 
     _settable: ClassVar[frozenset[str]] = frozenset()
     _correction: ClassVar[str] = "make another one"

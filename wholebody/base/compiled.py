@@ -58,8 +58,7 @@ LOOPS = tuple(name for names in TOGETHER for name in names)
 PRECOMPILED = Path(__file__).with_name("precompiled")
 """Folder of a wheel with loops that the maker's numba and Python compiled for the processor `BASELINE`."""
 
-BASELINE = ("x86-64-v3", "")
-"""LLVM's name of a processor with AVX2, and no more features than it has."""
+BASELINE = ("x86-64-v3", "")  # LLVM's name of a processor with AVX2, and no more features than it has
 
 BASELINE_FEATURES = frozenset(("+avx", "+avx2", "+bmi", "+bmi2", "+f16c", "+fma", "+lzcnt", "+movbe"))
 """What a processor must have to run code for `BASELINE`."""
@@ -98,10 +97,7 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
 
 
 def with_loops(name: str) -> Callable[[Callable[[Any], None]], Callable[[], Any]]:
-    """Make of what calls the loops of a module with small arguments a function that returns the module.
-
-    Its first call compiles the loops or reads them back, so that this does not happen in the middle of a solve.
-    """
+    """Of a function that calls a module's loops with small arguments: its first call compiles or reads them."""
 
     def decorate(call: Callable[[Any], None]) -> Callable[[], Any]:
         @lru_cache(maxsize=1)
@@ -234,10 +230,7 @@ def _cache_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _loop_type() -> Any:
-    """A compiled function of numba, read back from what is kept without all that compiling needs (0.4 of 0.5 s).
-
-    A constant that a caller gives is a value as any: numba would compile a function anew for each.
-    """
+    """A compiled function of numba, read back from what is kept without all that compiling needs (0.4 of 0.5 s)."""
     from numba.core import event
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler_lock import global_compiler_lock
@@ -284,10 +277,7 @@ def _loop_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _inner_type() -> Any:
-    """A compiled function that Python cannot call: numba compiles nothing to unpack its arguments.
-
-    Its code is optimised and made the processor's in its callers alone, which takes a seventh less time in all.
-    """
+    """A compiled function that Python cannot call; its code is optimised in its callers alone."""
 
     class Unlinked(_loop_type().code_type):  # type: ignore[misc]
         """Code for LLVM to put into that of callers."""

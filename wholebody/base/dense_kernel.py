@@ -109,11 +109,8 @@ def sort(values: Array, order: Indices) -> None:
 
 @compiled(inner=True, error_model="numpy")
 def least_squares(table: Array, size: int, x: Array) -> None:
-    """Write into x (n,) what minimises |A x - b|^2 + |R x - c|^2, by Householder's QR.
-
-    `table` (size + n, n + 1) holds A and b, then R and c with an upper triangular R; it is overwritten. Rows of A in
-    the order of their lengths, the longest first, are factorised stably row by row (Cox and Higham 1998).
-    """
+    """Minimise |A x - b|^2 + |R x - c|^2 into x (n,) by Householder's QR; `table` has A, b over R, c."""
+    # (size + n, n + 1), overwritten; long rows first are stable row by row (Cox and Higham 1998)
     columns = len(x)
     work = np.empty(columns + 1)
     for c in range(columns):

@@ -41,11 +41,8 @@ def suggestion(name: str, known: Collection[str]) -> str:
 
 
 def nearest_names(name: str, known: Collection[str]) -> list[str]:
-    """The known names that are most similar to a name, the best first.
-
-    Neither case nor the order of words matters, and "l" and "r" are sides: `hand_left`, `LeftHand` and `l_hand` are
-    nearest to `left_hand`. Of at most six names all are offered if none is alike.
-    """
+    """The known names most similar to a name, the best first; of at most six all, if none is alike."""
+    # case and the order of words do not matter, and l and r are sides: `LeftHand` and `l_hand` are near `left_hand`
     scores = {one: _likeness(name, one) for one in known}
     order = sorted(scores, key=lambda one: (-scores[one], one))
     if len(order) <= OFFERED + 2 and (not order or scores[order[0]] < ALIKE):

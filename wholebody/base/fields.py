@@ -170,7 +170,6 @@ def _check(hint: Any) -> Check | None:
 
 @cache
 def _names(kind: Any) -> tuple[str, ...]:
-    """Fields without a default whose values are texts."""
     return tuple(
         field.name
         for field, hint in _hints(kind)

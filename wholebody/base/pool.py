@@ -34,8 +34,7 @@ class Pool(Generic[T]):
             self._free.append(item)
 
 
-Loan: TypeAlias = AbstractContextManager[T]
-"""A context in which an object of a pool is borrowed."""
+Loan: TypeAlias = AbstractContextManager[T]  # a context in which an object of a pool is borrowed
 
 
 class OneAtATime:

@@ -28,16 +28,9 @@ class RecordFile(Generic[T]):
     counts. Several processes may write to one file; each sees what the others wrote at its next `add`. Numbers that are
     not finite come back as they were. `kept` has the records by key, in the order in which the keys came.
 
-    Args:
-        path: of the file; its folder is made if it does not exist.
-        content: what the records are, in words.
-        make: makes a record of the plain values that `dataclasses.asdict` gives; of a text it gets the text.
-        settings: of the run, as plain values; records of a run with other settings, or by other code of this package,
-            are refused.
-
-    Raises:
-        InputError: the settings are others, or the file cannot be written.
-        FileFormatError: the file holds something else, or another version.
+    `content` says in words what the records are, `make` makes one of the plain values that `dataclasses.asdict` gives
+    (of a text it gets the text), `settings` are plain values of the run. InputError for other settings, or a file that
+    cannot be written; FileFormatError for another file, or version.
     """
 
     def __init__(

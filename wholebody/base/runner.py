@@ -70,10 +70,7 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The outcome of a job: the notes that it sent before its answer, and what the function returned.
-
-    Where the process ended, there is no answer, and `error` says how.
-    """
+    """A job's outcome: notes that it sent, and what the function returned or, where its process ended, the `error`."""
 
     job: Job
     notes: tuple[Any, ...]
@@ -170,8 +167,7 @@ class Child:
         code = self._process.wait()
         self._output.seek(0)
         lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
-        # most characters kept of the last line that a process wrote
-        said = lines[-1].strip()[:200] if lines else ""
+        said = lines[-1].strip()[:200] if lines else ""  # most characters kept of the last line that a process wrote
         self.close()
         return EndedError(code, said)
 

@@ -11,10 +11,9 @@ from typing import Any, NoReturn
 from wholebody.base.batches import threads
 from wholebody.base.checks import is_number
 from wholebody.base.errors import InputError, UnknownNameError, suggestion
-from wholebody.cli.command import Option, checked, count, flag, option
+from wholebody.cli.command import Option, checked, count, flag, path, text, whole
 
-JOINED = "X,Y,Z"
-"""How the help shows numbers that are joined by commas."""
+JOINED = "X,Y,Z"  # how the help shows numbers that are joined by commas
 
 
 class Parser(argparse.ArgumentParser):
@@ -88,7 +87,7 @@ def _at_once(arguments: argparse.Namespace) -> None:
 
 JOBS: tuple[Option, ...] = (
     count("--jobs", None, "cases at a time (default: 1, or all of the cluster)"),
-    option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
+    text("--cluster", "ADDRESS", "of a dask scheduler, such as tcp://10.0.0.1:8786"),
     checked(_at_once),
 )
 """How many cases are done `at_once`, and where; a cluster that does not answer is refused before anything is done."""
@@ -108,12 +107,12 @@ OF_WORK = {
 def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
     """Options of a command that runs scenes with a scripted tracker: help of two, and the folder if none is given."""
     return (
-        option("scene", nargs="?", metavar="SCENE", help=scene),
+        text("scene", "SCENE", scene, nargs="?"),
         flag("--list", "list the scenes"),
-        option("--overlap", default="qp", metavar="METHOD", help=overlap),
-        option("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)"),
+        text("--overlap", "METHOD", overlap, default="qp"),
+        whole("--frames", "N", "number of frames (default: the whole script, once)"),
         count("--seed", 0, "seed of all random numbers", least=0),
-        option("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})"),
+        path("--out", "DIR", f"folder (default: {out})", default=Path(out)),
     )
 
 

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from wholebody.base.errors import InputError
@@ -13,8 +14,7 @@ from wholebody.base.errors import InputError
 Measure = Callable[[argparse.Namespace], "int | None"]
 """Runs a command; None is the exit code 0."""
 
-Option = Callable[[argparse.ArgumentParser], object]
-"""Adds itself to a parser."""
+Option = Callable[[argparse.ArgumentParser], object]  # adds itself to a parser
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,15 @@ class Group:
 def option(*names: str, **settings: Any) -> Option:
     """An option or an argument, as `ArgumentParser.add_argument` takes it."""
     return lambda parser: parser.add_argument(*names, **settings)
+
+
+def _values(kind: type | None) -> Callable[..., Option]:
+    """What declares options of a kind by name, how the help shows the value, the help and further settings."""
+    taken = {} if kind is None else {"type": kind}
+    return lambda name, shown, help, **settings: option(name, metavar=shown, help=help, **taken, **settings)
+
+
+path, text, real, whole = (_values(kind) for kind in (Path, None, float, int))
 
 
 def flag(name: str, help: str) -> Option:

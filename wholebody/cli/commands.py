@@ -8,7 +8,8 @@ from pathlib import Path
 from wholebody.base.files import is_file
 from wholebody.cli import bench, clip
 from wholebody.cli.arguments import JOBS, JOINED, OF_WORK, add_person, scene_options
-from wholebody.cli.command import Command, Group, command, flag, later, later_with_pictures, option
+from wholebody.cli.command import Command, Group, command, flag, later, option, path, real, text, whole
+from wholebody.cli.command import later_with_pictures as drawing
 from wholebody.methods import METHODS
 
 
@@ -30,9 +31,9 @@ Find a posture for a task file, print how good it is, and write into a folder:
   scene.png     a picture of it (needs Chromium; not with --json or --no-picture)
 
 docs/taskfile.md lists everything that a task file can contain.""",
-        option("task", type=Path, metavar="TASK.toml", help="the task file"),
-        option("--method", metavar="NAME", help=f"method, in place of the file's: {', '.join(METHODS)}"),
-        option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
+        path("task", "TASK.toml", "the task file"),
+        text("--method", "NAME", f"method, in place of the file's: {', '.join(METHODS)}"),
+        path("--out", "DIR", "folder to write to (default: out/NAME-OF-TASK)"),
         flag("--json", "print the result as JSON instead of tables; no picture"),
         flag("--no-picture", "do not draw scene.png, which takes seconds"),
         epilog="""\
@@ -40,7 +41,7 @@ examples:
   wholebody pose shelf.toml
   wholebody pose shelf.toml --method qp --out results/shelf
   wholebody pose shelf.toml --json | jq .joints""",
-    )(later_with_pictures("pose.run", lambda given: not (given.no_picture or given.json) and is_file(given.task))),
+    )(drawing("pose.run", lambda given: not (given.no_picture or given.json) and is_file(given.task))),
     command(
         "show",
         "show a figure, a task or a result",
@@ -50,21 +51,17 @@ Show in a browser. The command waits for the first tab, and ends when the last o
   a figure   human, avatar, hand, or the path of a URDF
   a task     the start of a task file, with its goals
   a result   result.json, written by `wholebody pose`""",
-        option("what", metavar="FIGURE|TASK|RESULT", help="what to show"),
+        text("what", "FIGURE|TASK|RESULT", "what to show"),
         add_person,
-        option("--posture", metavar="NAME", help="name of a posture of the figure"),
+        text("--posture", "NAME", "name of a posture of the figure"),
         flag("--pieces", "draw the pieces that contacts are measured with"),
-        option(
-            "--save", type=Path, metavar="FILE", help="write FILE.html, FILE.png or FILE.glb (glTF); open no browser"
-        ),
-        option(
-            "--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"
-        ),
-        option(
+        path("--save", "FILE", "write FILE.html, FILE.png or FILE.glb (glTF); open no browser"),
+        whole("--port", "N", "port of the live page (default: a free one from 7000)", default=0),
+        text(
             "--host",
+            "ADDRESS",
+            "address of the live page (default: 127.0.0.1; 0.0.0.0 allows access from other machines)",
             default="127.0.0.1",
-            metavar="ADDRESS",
-            help="address of the live page (default: 127.0.0.1; 0.0.0.0 allows access from other machines)",
         ),
         epilog="""\
 examples:
@@ -74,16 +71,16 @@ examples:
   wholebody show out/shelf/result.json
   wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
   wholebody show shelf.toml --save shelf.png""",
-    )(later_with_pictures("show.run", lambda given: given.save is not None and given.save.suffix.lower() == ".png")),
+    )(drawing("show.run", lambda given: given.save is not None and given.save.suffix.lower() == ".png")),
     command(
         "figure",
         "describe a figure, or write a person as a URDF",
         """\
 List the joints with their limits, the frames for goals, groups and postures of a figure:
 human, avatar, hand, or the path of a URDF. With --out, write a person as a URDF instead.""",
-        option("name", metavar="FIGURE", help="human, avatar, hand, or the path of a URDF"),
+        text("name", "FIGURE", "human, avatar, hand, or the path of a URDF"),
         add_person,
-        option("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file"),
+        path("--out", "FILE.urdf", "write a person's URDF to this file"),
         epilog="""\
 examples:
   wholebody figure human --sex female --stature 1.62 --mass 60
@@ -99,18 +96,18 @@ examples:
         """\
 Pose a packaged task (by default a person who reaches between the boards of a shelf), and print where the pictures are.
 You can copy and change the task file.""",
-        option("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)"),
+        text("name", "NAME", "which task (default: shelf)", nargs="?", default="shelf"),
         flag("--list", "list the tasks"),
-        option("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)"),
-    )(later_with_pictures("pose.demo", lambda given: not given.list)),
+        path("--out", "DIR", "folder (default: demo)", default=Path("demo")),
+    )(drawing("pose.demo", lambda given: not given.list)),
     command(
         "gallery",
         "run the example scripts, and show them on one page",
         """\
 Run the packaged example scripts, and write one page that opens without a network. It has the picture of each, its
 story, what it printed, its code, and its scene to turn. All of them take some minutes.""",
-        option("names", nargs="*", metavar="NAME", help="which scripts (default: all)"),
-        option("--out", type=Path, default=Path("gallery.html"), metavar="PAGE", help="page (default: gallery.html)"),
+        text("names", "NAME", "which scripts (default: all)", nargs="*"),
+        path("--out", "PAGE", "page (default: gallery.html)", default=Path("gallery.html")),
     )(later("pose.gallery")),
     command(
         "interact",
@@ -142,34 +139,22 @@ paths:
   line      from the start of the dragged frame to --to, or to the goal's target
   circle    from the start to a circle of radius --size around the goal's target, normal to --normal
   FILE      from the start through the points of a text file: x y z in metres, one point a line""",
-        option("task", type=Path, metavar="TASK.toml", help="the task file"),
+        path("task", "TASK.toml", "the task file"),
         _path_or_live,
-        option("--method", default="qp", metavar="NAME", help=f"{', '.join(METHODS)} (default: qp)"),
-        option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
-        option(
-            "--goal",
-            type=int,
-            metavar="N",
-            help="which goal, from 0 (default: first with a place)",
-        ),
-        option("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)"),
-        option("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)"),
-        option(
+        text("--method", "NAME", f"{', '.join(METHODS)} (default: qp)", default="qp"),
+        whole("--port", "N", "of the live page (default: 8080)", default=8080),
+        whole("--goal", "N", "which goal, from 0 (default: first with a place)"),
+        whole("--frames", "N", "number of frames (default: 0.5 m/s)"),
+        real("--size", "M", "radius of a circle, m (default: 0.1)", default=0.1),
+        real(
             "--normal",
-            type=float,
+            ("X", "Y", "Z"),
+            "normal of a circle's plane (default: 1 0 0, which faces the figure)",
             nargs=3,
             default=(1.0, 0.0, 0.0),
-            metavar=("X", "Y", "Z"),
-            help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
         ),
-        option(
-            "--to",
-            type=float,
-            nargs=3,
-            metavar=("X", "Y", "Z"),
-            help="end of a line, m",
-        ),
-        option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)"),
+        real("--to", ("X", "Y", "Z"), "end of a line, m", nargs=3),
+        path("--out", "DIR", "folder to write to (default: out/drag/NAME-OF-TASK)"),
         epilog="""\
 --live opens a page instead: drag the handles on hands, feet, pelvis, head and things with the mouse, click one to
 hold it; "undo" goes back, "save" writes the posture as a task file into the folder.
@@ -194,13 +179,11 @@ without a network).""",
             "qp or ccd (default: qp)",
             "out/world",
         ),
-        option(
-            "--give-way", default="figure", metavar="WHO", help="figure or both: who takes an overlap (default: figure)"
-        ),
+        text("--give-way", "WHO", "figure or both: who takes an overlap (default: figure)", default="figure"),
         flag("--picture", "draw five moments too, by a headless Chromium"),
         flag("--live", "open a page instead: drag handles and things with the mouse, and throw them (needs viser)"),
-        option("--port", type=int, metavar="N", help="of the live page (default: 8080)"),
-        option("--udp", type=int, metavar="N", help="port at which places of handles arrive for the live page"),
+        whole("--port", "N", "of the live page (default: 8080)"),
+        whole("--udp", "N", "port at which places of handles arrive for the live page"),
         epilog="""\
 --live runs the scene in a browser without its script: the figure follows its handles, a thing that is let go flies on.
 Datagrams to the port of --udp move handles too: {"head_top": [0.1, 0.0, 1.7], "right_palm": [0.4, -0.2, 1.1]}, metres.
@@ -222,8 +205,8 @@ Solve the task of a study file for each person, with each target, in each layout
 
   cases.csv         one row a case
   records.jsonl     the same with the postures; an interrupted run continues from it""",
-        option("study", type=Path, metavar="FILE.toml", help="the study file"),
-        option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
+        path("study", "FILE.toml", "the study file"),
+        path("--out", "DIR", "folder to write to (default: out/NAME-OF-FILE)"),
         *JOBS,
         epilog="""\
 a study file:
@@ -257,13 +240,13 @@ goals, and write into a folder:
   reach.html   the same with a slider, for any browser
   reach.npz    all arrays: verdicts, distances left, postures
   reach.vtk    verdicts and distances, for ParaView and the like""",
-        option("task", type=Path, metavar="TASK.toml", help="the task file: figure, things, constraints"),
-        option("--frame", required=True, metavar="NAME", help="the frame that reaches"),
-        option("--low", required=True, metavar=JOINED, help="least corner of the grid, metres"),
-        option("--high", required=True, metavar=JOINED, help="greatest corner"),
-        option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
+        path("task", "TASK.toml", "the task file: figure, things, constraints"),
+        text("--frame", "NAME", "the frame that reaches", required=True),
+        text("--low", JOINED, "least corner of the grid, metres", required=True),
+        text("--high", JOINED, "greatest corner", required=True),
+        text("--step", "M", "metres between places, or X,Y,Z (default: 0.1)", default="0.1"),
         *JOBS,
-        option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
+        path("--out", "DIR", "folder to write to (default: out/NAME-OF-TASK)"),
         epilog="""\
 examples:
   wholebody reach seat.toml --frame right_index_tip --low 0,-0.8,0.4 --high 1.0,0.4,1.6 --step 0.1
@@ -275,10 +258,10 @@ examples:
         """\
 Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
 print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it.""",
-        option("result", type=Path, metavar="RESULT.json", help="the result"),
+        path("result", "RESULT.json", "the result"),
         flag("--ergonomics", "score the ergonomics of a person"),
-        option("--load", type=float, metavar="KG", help="mass in both hands (default: 0)"),
-        option("--coupling", metavar="WORD", help="grip: good (default), fair, poor, unacceptable"),
+        real("--load", "KG", "mass in both hands (default: 0)"),
+        text("--coupling", "WORD", "grip: good (default), fair, poor, unacceptable"),
         *(
             option(f"--{name.replace('_', '-')}", action="store_const", const=True, help=says)
             for name, says in OF_WORK.items()
@@ -288,8 +271,8 @@ print RULA, REBA, OWAS and the torques against published strength too; --json pr
             choices=("yes", "no"),
             help="whether the person sits (default: decided by what is below, or the posture)",
         ),
-        option("--sex", metavar="SEX", help="of the strength: male or female (default: the person's)"),
-        option("--percentile", type=float, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
+        text("--sex", "SEX", "of the strength: male or female (default: the person's)"),
+        real("--percentile", "P", "of the strength, 5 to 95 (default: 50)"),
         flag("--json", "print JSON instead of tables"),
         epilog="""\
 examples:

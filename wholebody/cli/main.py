@@ -43,10 +43,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line with arguments, by default those of the process.
-
-    Returns the exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
-    """
+    """Run the command line, by default the process's: the exit code, see `EXIT_CODES`; 130 after Ctrl-C."""
     try:
         if not _ready():
             return 2

@@ -27,11 +27,9 @@ from wholebody.taskfile import Task, read_task, result
 from wholebody.view.gallery import Exhibit, write_gallery
 from wholebody.view.screenshot import Screenshots
 
-CONTACTS = 10
-"""Most pairs that are listed."""
+CONTACTS = 10  # most pairs that are listed
 
-NEAR = 0.01
-"""Metres beyond the clearance at which a pair is listed."""
+NEAR = 0.01  # metres beyond the clearance at which a pair is listed
 
 _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "infeasible": "red"}
 

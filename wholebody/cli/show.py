@@ -75,7 +75,6 @@ def run(arguments: argparse.Namespace, screenshots: Screenshots) -> int:
 
 
 def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np.float64], View, str]:
-    """Problem, posture, view and title of the subject."""
     path = Path(what)
     if options and path.suffix.lower() in (".json", ".toml"):
         raise InputError(f"{path} says which person it shows; leave out --{next(iter(options))}")

@@ -17,17 +17,13 @@ from wholebody.bench.rows import Row, shown
 def console(least: int = 0) -> Console:
     """The output, whose lines have `least` letters or more, and where it is no terminal enough for all tables."""
     made = Console()
-    # letters of a line in a file or a log
-    made.width = max(made.width, least, 0 if made.is_terminal else 140)
+    made.width = max(made.width, least, 0 if made.is_terminal else 140)  # letters of a line in a file or a log
     return made
 
 
 @contextmanager
 def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], Any]]:
-    """Show on a terminal how far something is: the function takes how much of `count` is done, and what it is.
-
-    The line goes when it is done.
-    """
+    """Show on a terminal how much of `count` is done, and what, by the function that it yields."""
     line, shown = Line(), sys.stderr is not None and sys.stderr.isatty()
     if shown:
         line.write(0, count, what)

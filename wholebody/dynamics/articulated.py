@@ -114,11 +114,8 @@ class Articulated:
         return self._masses
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
-        """Advance by at most a time, to the next impact if that comes first; by how much.
-
-        The engine sees the figure as something that is moved. Where it finds an impact with it that the program of
-        the figure's contacts did not foresee, the step is made again, and ends there; after `STOPS` the next has it.
-        """
+        """Advance by at most a time, to the next impact if that comes first; by how much."""
+        # an impact with the figure that its program did not foresee ends the step, made again at most `STOPS` times
         figure, impulses = (self.q, self.velocity), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
         most = time
@@ -185,11 +182,8 @@ class Articulated:
         return time, frame
 
     def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
-        """The wrenches of a step without its impacts with the figure, which the next step has at its start.
-
-        To the engine the figure is as heavy as anything: what it threw back would bring energy from nowhere. Blows that
-        alternate with those of something else, as on what is squeezed, are taken back to the energy `most` [J].
-        """
+        """The wrenches of a step without its impacts with the figure, which the next step has at its start."""
+        # To the engine it is infinitely heavy, and would bring energy; alternating blows are taken back to `most` [J].
         wrenches, engine = dict(frame.wrenches), self._engine
         met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
         met += [(second, first, -impulse, point) for first, second, impulse, point in met]
@@ -294,10 +288,7 @@ class Articulated:
     def _solved(
         self, inertia: Array, points: Points, speed: Array, target: Array, blow: bool = False
     ) -> tuple[Array, Array]:
-        """Impulses (m, 3) that bring the points to least normal velocities, and the velocities (3 m,) with them.
-
-        Those of a blow add no kinetic energy.
-        """
+        """Impulses (m, 3) of least normal velocities, and these (3 m,); those of a blow add no energy."""
         impulse, kept = np.zeros((len(target), 3)), np.flatnonzero(target > -np.inf)
         if not len(kept):
             return impulse, speed
@@ -332,10 +323,7 @@ class Articulated:
     def _move(
         self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float
     ) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints by a way (nv,), and centres of mass to their places; the motions of the segments.
-
-        Nothing rises beyond a potential energy [J]: what lies still is not parted from what it overlaps.
-        """
+        """Move the joints by a way (nv,), and nothing above a potential energy [J]; the motions of the segments."""
         model, data, before = self._model, self._data, self._placements(segments)
         start, lowest = self.q, self._potential()
         self.q = np.array(pin.integrate(model, start, way))
@@ -355,10 +343,7 @@ class Articulated:
         return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
-        """Give free roots their momenta, and scale the velocities beside those by at most a factor.
-
-        Then kinetic and potential energy are at most `energy`.
-        """
+        """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`."""
         masses, roots, velocity = self._inertia(self.q), self._adrift, self.velocity
         pin.forwardKinematics(self._model, self._data, self.q)
         drift = np.zeros_like(velocity)
@@ -378,10 +363,7 @@ class Articulated:
         self.velocity = drift + velocity
 
     def _react(self, given: Mapping[str, Array], moved: Moved, time: float, segments: Mapping[str, int]) -> None:
-        """Give the figure the impulses that things gave its segments while they went on, and no energy beside.
-
-        For the things the segments are as heavy as anything; what weighs much more than they do would throw them.
-        """
+        """Give the figure the impulses that things gave its segments while they went on, and no energy beside."""
         if not given:
             return
         model, data, energy = self._model, self._data, self.energy()

@@ -36,8 +36,7 @@ class BodiesState:
     @property
     def active(self) -> Mask:
         """(n,) bodies that move, by themselves or because their motion is given."""
-        found: Mask = self.bodies.moving | self.bodies.given
-        return found
+        return np.asarray(self.bodies.moving | self.bodies.given)
 
     def put(self, number: int, at: pin.SE3) -> None:
         """Place a body."""
@@ -106,12 +105,9 @@ class BodiesState:
 
 
 class Joints:
-    """All joints of a scene, as points that stay together.
+    """Joints as points that stay together, one of a ball joint, two on a hinge's axis, where they hinder least."""
 
-    A ball joint is one point, a hinge two points on its axis, as far apart as they hinder each other least. The program
-    of a step holds them (`step_program`) so that they are together at its end. After a step the velocities are made to
-    keep them together (as RATTLE does; Andersen, 1983), which only takes energy.
-    """
+    # the step's program holds them, and then velocities do (RATTLE; Andersen 1983), which takes energy
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
         self._pieces = pieces
@@ -150,8 +146,7 @@ class Joints:
 
     def linked(self, number: int) -> Mask:
         """Bodies (n,) that move by themselves and are linked with one by joints, itself among them."""
-        found: Mask = self._pieces.dynamic & (self._island == self._island[number])
-        return found
+        return np.asarray(self._pieces.dynamic & (self._island == self._island[number]))
 
     def together(self) -> Indices:
         """(k, 2) bodies that joints hold together, one of which moves by itself at least."""

@@ -162,11 +162,8 @@ class PushedContacts:
 
 
 def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Surface) -> Array | None:
-    """Impulse (3,) on body B, N s: equation 9, with friction of equation 10; None if A and B do not approach.
-
-    `relative` (3,) is the velocity of B's point relative to A's, `normal` (3,) from A to B, and `mobility` (3, 3) the
-    change of that velocity by an impulse on B, and its opposite on A.
-    """
+    """Impulse (3,) on B [N s] by equations 9 and 10, for a velocity `relative` (3,) to A; None if they part."""
+    # `normal` (3,) from A to B; `mobility` (3, 3): change of that velocity by an impulse on B, and its opposite on A
     approach, least = -float(normal @ relative), 1e-6  # m/s
     if approach <= least:
         return None
@@ -278,16 +275,10 @@ class Points(NamedTuple):
         directions: Array,
         time: float,
     ) -> None:
-        """Add what the things at the first points are.
+        """Add what the things at the first points are, whose both `owners` (k,) have names.
 
-        Args:
-            surfaces: what happens where both touch.
-            engine: has the bodies.
-            moved: things to their placements before and after the step.
-            owners: (k,) both that touch, by name.
-            place: (k, 3) points.
-            directions: (k, 3, 6) rows that take a twist at the origin to velocities along the axes of each point.
-            time: of the step, seconds.
+        `moved`: things to their placements before and after the step; `place` (k, 3) points; `directions` (k, 3, 6)
+        take a twist at the origin to velocities along the axes of each point; `time` of the step, seconds.
         """
         places = {name: 6 * b for b, name in enumerate(self.bodies)}
         for c, both in enumerate(owners):
@@ -315,15 +306,7 @@ def axes_of(normal: Array) -> Array:
 def near_limits(
     model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
 ) -> list[tuple[int, float, float]]:
-    """Freedoms that can come to a limit within a time, the sign of motion away from it, and how far it is.
-
-    Args:
-        model: has the limits.
-        limited: (k, 2) places of freedoms in q and in the velocity.
-        q: (nq,) posture.
-        velocity: (nv,).
-        time: seconds.
-    """
+    """Of `limited` (k, 2): places in q, velocity: that can come to a limit, the sign away from it, and how far."""
     at, freedom = limited.T
     gaps = q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]
     near = [gap < 0.02 + 1.5 * time * np.abs(velocity[freedom]) for gap in gaps]  # rad, m
@@ -331,15 +314,7 @@ def near_limits(
 
 
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
-    """Bounds (pairs,) of the speeds at which the pieces of pairs approach each other, m/s.
-
-    That of a point of the smaller piece, seen from the other: of its centre, and by rotation about that.
-
-    Args:
-        table: pieces and pairs.
-        centres: (n, 3) of the pieces, metres.
-        twist: (n, 6) of the pieces at the world's origin, m/s and rad/s.
-    """
+    """Bounds (pairs,) [m/s] of the approach of pieces with `centres` (n, 3) and twists (n, 6) at the origin."""
     first, second = table.pairs.T
     smaller = np.where(table.reach[first] < table.reach[second], first, second)
     relative = twist[first] - twist[second]
@@ -351,11 +326,8 @@ def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
 def drift(
     data: pin.Data, root: int, momentum: Array, gravity: Array, time: float, borne: bool
 ) -> tuple[pin.Force, Array]:
-    """Momentum about the origin and centre (3,) of what a free root carries, a time after its momentum (6,).
-
-    The centre moves by the mean of the velocities before and after, in a step with contacts (`borne`) by that after,
-    as the joints do. The weight acts where that keeps the angular momentum of a centre on its way.
-    """
+    """Momentum about the origin, and centre (3,), of what a free root carries, a time after its momentum (6,)."""
+    # the centre moves by the mean of both velocities, in a step with contacts (`borne`) by the later, as joints do
     place, share = data.oMi[root], 1.0 if borne else 0.5
     now = place.act(pin.Force(momentum))
     mass, centre = data.mass[root], place.act(data.com[root])
@@ -365,10 +337,7 @@ def drift(
 
 
 def share_below(energies: tuple[float, float, float], most: float) -> float:
-    """The largest share from 0 to 1 of an impulse with which an energy is at most `most`, J.
-
-    The energy is quadratic in the share; `energies` are those with none, half and all of it.
-    """
+    """Largest share of an impulse with an energy of at most `most` [J]; `energies`: of none, half and all."""
     none, half, full = energies
     square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
     if full <= most or square <= 0.0:

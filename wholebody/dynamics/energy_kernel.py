@@ -89,17 +89,9 @@ def restrain(
     """Scale velocities down where an island gained energy, and write which points are jammed.
 
     Islands with joints, and those that something moved pushes, are settled after they have moved: see `settle`.
-
-    Args:
-        points: (m, 2) bodies of all points, those of joints at the end.
-        impulse: (m, 3) of the program.
-        off: (k,) contact points whose rates the program did not reach.
-        bodies: after the program; their velocities are changed in place.
-        movable: (n,) bodies that the program moves: those that move by themselves, and what yields.
-        before: (n, 6) velocities before the step.
-        fall: (3,) gravity times the time of the step, m/s.
-        jammed: (k,) room: contact points that bear something of islands that something moved pushes, where a rate is
-            off.
+    `points` (m, 2) and `impulse` (m, 3) are of all points, joints last; `off` (k,) contact points whose rates the
+    program did not reach; `movable` (n,) what it moves; `before` (n, 6) velocities; `fall` (3,) gravity times the time,
+    m/s; `jammed` (k,) room for contact points that bear something of pushed islands where a rate is off.
     """
     root, kind, pushed = _islands(points, impulse, len(off), bodies, movable)
     _find_jammed(points, impulse, off, bodies, root, kind, jammed)
@@ -164,7 +156,6 @@ def settle(
 def _find_jammed(
     points: Indices, impulse: Array, off: Mask, bodies: Bodies, root: Indices, kind: Indices, jammed: Mask
 ) -> None:
-    """See `restrain`."""
     unsolved = np.zeros(len(root), dtype=np.bool_)
     for c in range(len(off)):
         if impulse[c, 0] > 0.0 and off[c]:

@@ -28,10 +28,7 @@ def resolve(
     touching: Indices, pair: Indices, rows: Rows, restitution: Array, laws: Laws, jointed: Mask, twist: Array,
     events: Array,
 ) -> tuple[int, bool]:  # fmt: skip
-    """Resolve impacts of points (k,) that touch: how many there were, and whether none is left.
-
-    Each of the events (most, 5) is the point, the approach [m/s] and the impulse [N s]; velocities change in place.
-    """
+    """Resolve impacts of points (k,); how many, and if none is left. `events`: point, approach [m/s], impulse [N s]."""
     count = len(touching) + len(laws.hold)
     chosen, before, impulse = np.empty(count, dtype=np.intp), np.zeros((count, 3)), np.zeros((len(rows.bodies), 3))
     for event in range(len(events)):

@@ -18,10 +18,7 @@ COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refi
 
 @compiled(error_model="numpy", fastmath=FAST)
 def mobilities(inertia: Array, rows: Array) -> Array:
-    """Change (k, k) of the velocities along rows (k, n) by unit impulses along them, of an inertia (n, n).
-
-    On one thread: the threads of a BLAS wait for each other longer than they compute, where other programs run.
-    """
+    """(k, k) changes of velocities along rows (k, n) by unit impulses along them, of an inertia (n, n)."""
     size, count = inertia.shape[0], rows.shape[0]
     root, white, found = inertia.copy(), np.empty((size, count)), np.empty((count, count))
     factorise(root)
@@ -102,10 +99,7 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
 def _sweep(
     mobility: Array, all_velocities: Array, points: tuple[Array, Array, Indices, Array], most: int, tolerance: float
 ) -> tuple[int, bool]:
-    """Sweep over k points of m, with their mobilities (3 k, 3 k); how often, and whether the last changed little.
-
-    The points have the friction (m,), target (m,), number (k,), and impulses (k, 3), which change in place.
-    """
+    """Sweep over k of m points, changing their impulses (k, 3): how often, and whether the last changed little."""
     friction, target, chosen, impulse = points
     count = len(chosen)
     velocity, before, way = np.empty(3 * count), np.zeros((count, 3)), np.zeros((count, 3))
@@ -157,14 +151,9 @@ def _split(
 ) -> tuple[float, float]:
     """Steps of the alternating direction method: by how much the impulses broke the program, and the laws of contact.
 
-    Args:
-        mobility: (3 m, 3 m).
-        weight: (3 m,) of what the laws of contact change.
-        rest: (3 m,) velocities without impulses, less the targets.
-        friction: (m,).
-        impulse: (3 m,) the impulses; they obey the laws of contact, and change in place.
-        dual: (3 m,) the velocities at which these are solved, likewise.
-        most: steps.
+    `mobility` (3 m, 3 m); `weight` (3 m,) of what the laws of contact change; `rest` (3 m,) velocities without
+    impulses, less the targets; `impulse` (3 m,) obeys the laws, `dual` are the velocities at which these are solved:
+    both change in place.
     """
     size = len(rest)
     root, found, free, broken, moved = mobility.copy(), np.empty(size), np.empty(size), 0.0, 0.0
@@ -240,11 +229,8 @@ def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> t
 
 
 def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impulse: Array) -> Array:
-    """The impulses (m, 3) of `solve` or, if they are nearer to the solution, those of the alternating direction method.
-
-    Sweeps do not end where much rests on little: an impulse passes a thousandth of itself on in each. This method
-    factors the matrix, with weights that follow what breaks more, the program or the laws of contact.
-    """
+    """The impulses (m, 3) of `solve`, or of the alternating direction method where they are nearer."""
+    # sweeps pass on a thousandth of an impulse where much rests on little; this method factors the matrix
     rest = speed.copy()
     rest[::3] -= target
     own = np.maximum(mobility.diagonal().reshape(-1, 3), 1e-9)

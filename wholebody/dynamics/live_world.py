@@ -217,7 +217,6 @@ class LiveWorld:
         engine.push(name, dt * (mass * drawn - engine.weight(name)), engine.centre(name))
 
     def _ease(self) -> None:
-        """Bring handles back that a tracker has lost."""
         for name, renewed in list(self._renewed.items()):
             if self.world.time - renewed > HELD:
                 share = min(1.0, self.world.dt / (0.3 * BACK))

@@ -54,10 +54,7 @@ class Way(NamedTuple):
 def free_between(
     state: BodiesState, before: StepStart, after: Contacts, margin: Array, travel: Array, time: float, gravity: float
 ) -> bool:
-    """Whether no pieces can have been deeper than `PASSING` in each other within a step.
-
-    Pairs `after` it are within margins (n,) of both bodies, metres; no point of a body moved more than its travel (n,).
-    """
+    """Whether no pieces can have been deeper than `PASSING` within a step; margins and travels (n,) [m]."""
     before.widen(travel)
     pieces, near = state.pieces, before.near
     found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)

@@ -208,10 +208,7 @@ class ContactPoints(NamedTuple):
     gap: Array  # (m,) metres
 
     def linked(self, bodies: Mask, movable: Mask, things: int, touch: float) -> ContactPoints:
-        """Points of `bodies` (n,), and of what touches them in turn, with the first bodies, which are `things`.
-
-        What touches, with gaps up to `touch` [m], joins if it is `movable` (n,), while all have `TOGETHER` points.
-        """
+        """Points of `bodies` (n,) and of movable ones that touch them, gaps up to `touch` [m]."""
         among, linked = (self.bodies < things).all(axis=1), bodies
         while True:
             found = among & linked[self.bodies].any(axis=1)

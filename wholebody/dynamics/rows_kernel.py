@@ -98,8 +98,7 @@ def joint_rows(points: JointPoints, bodies: Bodies, rows: Rows) -> None:
                 own = rows.jacobian[c, row, 6 * side : 6 * side + 6]
                 own[:] = 0.0
                 own[row] = sign
-                # the point's velocity along e is v . e + w . (r x e)
-                own[3 + i] = sign * lever[j]
+                own[3 + i] = sign * lever[j]  # the point's velocity along e is v . e + w . (r x e)
                 own[3 + j] = -sign * lever[i]
         _respond(c, bodies, inverse, rows, gram)
         rows.mobility[c, :] = max(gram[0, 0], gram[1, 1], gram[2, 2])

@@ -18,11 +18,7 @@ MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap a
 
 
 class Sleepers:
-    """Which bodies sleep. A body sleeps and wakes together with all that touch each other.
-
-    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `MOVED`, however
-    slowly or suddenly it came there, the sleeper wakes. What comes to touch a sleeper later has moved, and wakes it.
-    """
+    """Which bodies sleep: together with all that touch each other, until what touches them is elsewhere by `MOVED`."""
 
     def __init__(self, state: BodiesState, together: Indices) -> None:
         """Let all be awake; `together` (k, 2) are bodies that joints hold together."""
@@ -114,7 +110,6 @@ class Sleepers:
             self.wake(finder.near(state.bodies.position, state.bodies.rotation, margin, put), put)
 
     def _forget(self) -> None:
-        """Forget what touched bodies that are awake."""
         kept = self._asleep()[self._touched[:, 0]]
         if not kept.all():
             self._touched, self._position, self._rotation = (

@@ -151,10 +151,7 @@ def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array,
 
 @compiled(error_model="numpy", fastmath=FAST)
 def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: Limits) -> int:
-    """Solve the program of all points, each island of bodies that bear each other apart; the sweeps over all.
-
-    The limits are those of each island; one whose last sweep changes more than 30 tolerances has six times the sweeps.
-    """
+    """Solve the program of all points, each island apart; the sweeps over all, for slow islands six times as many."""
     count, bodies = len(rows.bodies), len(twist)
     listed, changes = np.empty(count, dtype=np.intp), np.zeros(count)
     root, swept, sweeps = np.empty(bodies, dtype=np.intp), np.zeros(bodies, dtype=np.intp), 0

@@ -163,11 +163,8 @@ class StepProgram:
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
-        """Change the velocities to those at the end of a step of `time` seconds, which adds no energy.
-
-        `together`: impacts during the step bounce by this program, else the first ends it; `old`: impulses of the step
-        before; `hold`: (j, 3) velocity of the joint points of B seen from those of A, m/s.
-        """
+        """Change the velocities to those at the end of a step of `time` [s], which adds no energy."""
+        # `together`: impacts bounce by it; `old` impulses; `hold` (j, 3): velocity of B's joint points by A's
         state, points = self.state, self.points
         twist, moving = state.bodies.twist, state.bodies.moving
         began = twist.copy()
@@ -240,10 +237,7 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """The start of the next program, without impulses that would grow without bound.
-
-        Those are of bodies that are pushed together, and of what yields: its motion changes by them after the step.
-        """
+        """The start of the next program, without impulses of pushed bodies and of what yields, which would grow."""
         grow = self._jammed | self._yielding[self.points.bodies].any(axis=1)
         kept, count = np.flatnonzero(self._bearing() & ~grow), len(self.points.gap)
         return Impulses(
@@ -252,8 +246,7 @@ class StepProgram:
 
     def _bearing(self) -> Mask:
         """Contact points (m,) that bear something."""
-        found: Mask = self.impulse[: len(self.points.gap), 0] > 0.0
-        return found
+        return np.asarray(self.impulse[: len(self.points.gap), 0] > 0.0)
 
     def separation(self, gap: float) -> Array:
         """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""

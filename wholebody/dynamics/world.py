@@ -307,8 +307,7 @@ def _scene_instead(given: object) -> str:
 
 _FILE = SceneFile(Path(__file__).with_name("scenes.toml"), FILE)
 
-WORLD_SCENES = _FILE.scenes
-"""Descriptions of the scenes, by name."""
+WORLD_SCENES = _FILE.scenes  # descriptions of the scenes, by name
 
 build_world_scene = _FILE.build
 

@@ -34,8 +34,7 @@ class SideAngles:
     # positive, -90 degrees points backward, and whatever points higher is more than 90 degrees, up to 270
     shoulder_flexion: float
     shoulder_abduction: float  # of the upper arm out of the sagittal plane; outward is positive
-    # height of the shoulder's centre above that of the upright body, in the thorax's axes, metres
-    shoulder_rise: float
+    shoulder_rise: float  # height of the shoulder's centre above that of the upright body, in the thorax's axes, metres
     elbow_flexion: float  # between upper arm and forearm; 0 is straight
     forearm_outward: float  # of the forearm out of the sagittal plane; outward is positive
     across: bool  # whether the wrist is beyond the middle plane of the trunk

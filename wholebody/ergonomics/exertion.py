@@ -31,8 +31,7 @@ LEVER = 0.06
 ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
 FEET = ("left_sole", "right_sole")
 RAISED = 0.03  # m: a sole higher than this over the lower one bears nothing
-MOST = 3400.0
-"""N: compression that NIOSH's action limit allows (1981)."""
+MOST = 3400.0  # N: compression that NIOSH's action limit allows (1981)
 
 
 def _strength(value: object, where: str) -> Strength:

@@ -116,7 +116,7 @@ class Sight:
         return self.off <= 1.0 + BORDER and not self.hidden_by and self.distance >= BLURRED
 
 
-def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *, eyes: str = EYES) -> Sight:
+def sight(scene: Scene, q: Array, point: Array, *, eyes: str = EYES) -> Sight:
     """Whether a person in a posture sees a point, without turning the head.
 
     A thing that the point is in, or on the surface of, is what is looked at and hides nothing.
@@ -125,7 +125,6 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *,
         scene: with a figure that has the frame "gaze".
         q: (nq,) posture.
         point: (3,) metres.
-        field: how far the eyes turn.
         eyes: the frame between the eyes of the person who looks, such as "anna/gaze" of one of several figures.
 
     Raises:
@@ -139,7 +138,6 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *,
     q = checks.posture(q, scene.model.nq, "sight: q")
     scene.figure.warn_of_angles(q, "sight: q")
     target = inputs.point(point, "sight: point")
-    checks.instance(field, FieldOfView, "sight: field", "give one such as FieldOfView()")
     if eyes not in scene.figure.frames:
         raise InputError(f"sight: {scene.figure.name} has no frame {eyes!r} between its eyes; load a person")
     between = scene.figure.placement(q, eyes)
@@ -149,7 +147,7 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST, *,
         return Sight(0.0, False, distance, "")
     own = tuple(eyes.removesuffix(EYES) + part for part in ("head", "neck"))  # which do not hide anything from them
     hidden = _between(scene, q, np.asarray(between.translation), target, own)
-    return Sight(field.off(local), COMFORTABLE.off(local) <= 1.0 + BORDER, distance, hidden)
+    return Sight(LARGEST.off(local), COMFORTABLE.off(local) <= 1.0 + BORDER, distance, hidden)
 
 
 def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str, ...]) -> str:
@@ -190,7 +188,6 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, own: tuple[str,
 
 
 def _meet(first: Any, there: coal.Transform3s, second: Any, at: coal.Transform3s) -> bool:
-    """Whether two convex shapes overlap."""
     return bool(coal.collide(first, there, second, at, coal.CollisionRequest(), coal.CollisionResult()))
 
 

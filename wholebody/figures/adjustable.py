@@ -24,8 +24,7 @@ SETTINGS = {
 }
 """Joint and greatest value of each setting."""
 
-ADJUSTABLE = "adjustable"
-"""Name of such a figure."""
+ADJUSTABLE = "adjustable"  # name of such a figure
 
 COLOR = np.array((0.45, 0.47, 0.50, 1.0))
 

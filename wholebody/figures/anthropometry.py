@@ -23,8 +23,7 @@ from wholebody.figures.population import SEXES, UNITS, population
 from wholebody.figures.sizes import THUMB_TIP, TRUNK, Skeleton, arm_sizes, leg_sizes
 from wholebody.figures.tables import keyed, table
 
-STATURE = Range(1.3, 2.2, "m")
-"""The distribution comes from adults of 1.4 to 2.0 m; beyond this range it is invalid."""
+STATURE = Range(1.3, 2.2, "m")  # the distribution comes from adults of 1.4 to 2.0 m; beyond this range it is invalid
 
 MASS = Range(25.0, 250.0, "kg")
 PERCENTILE = Range(1.0, 99.0, "percent, such as 95")
@@ -301,8 +300,7 @@ def design_cases() -> Mapping[str, Person]:
     }
 
 
-RELAXED = 0.93
-"""The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
+RELAXED = 0.93  # the arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)
 
 
 class Finger(NamedTuple):

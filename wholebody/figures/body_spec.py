@@ -85,8 +85,7 @@ VIRTUAL_MASS = 1e-6
 """Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
 the next link outwards, so that the total is right."""
 
-SKIN = (0.85, 0.68, 0.55, 1.0)
-"""Colour of the pieces: red, green, blue, opacity."""
+SKIN = (0.85, 0.68, 0.55, 1.0)  # colour of the pieces: red, green, blue, opacity
 
 
 def urdf_text(spec: BodySpec, extension: str = "") -> str:
@@ -235,8 +234,7 @@ def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[
 
 
 RINGS = 5
-AROUND = 10
-"""Rings of vertices between the poles, and vertices on each: 52 vertices, 2 * 5 * 10 = 100 triangles."""
+AROUND = 10  # rings of vertices between the poles, and vertices on each: 52 vertices, 2 * 5 * 10 = 100 triangles
 
 
 @lru_cache(maxsize=1)

@@ -17,8 +17,7 @@ from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 
-_PARALLEL = 1e-9
-"""Axes with a smaller sine of their angle count as parallel; otherwise d would be kilometres."""
+_PARALLEL = 1e-9  # axes with a smaller sine of their angle count as parallel; otherwise d would be kilometres
 
 
 class DenavitHartenberg(NamedTuple):

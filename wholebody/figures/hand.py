@@ -24,8 +24,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
 from wholebody.figures.tables import keyed, named_angles
 
-MESH = "meshes/ellipsoid.obj"
-"""The unit polyhedron that the URDF scales to each part."""
+MESH = "meshes/ellipsoid.obj"  # the unit polyhedron that the URDF scales to each part
 
 FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}
 SIDES = ("left", "right")
@@ -162,8 +161,7 @@ def _metacarpal(size: Dimensions, side: str) -> pin.SE3:
     radial, palmar = math.radians(40.0), math.radians(30.0)
     along = np.array([math.sin(radial), -sign * math.sin(palmar), -math.cos(radial)])
     along /= np.linalg.norm(along)
-    # The thumb bends across the palm, towards the little finger.
-    bend = np.array([-0.8, -sign * 0.6, 0.0])
+    bend = np.array([-0.8, -sign * 0.6, 0.0])  # the thumb bends across the palm, towards the little finger
     bend -= along * (along @ bend)
     y = -sign * bend / np.linalg.norm(bend)
     return pin.SE3(np.column_stack([np.cross(y, -along), y, -along]), _knuckle(size, "thumb"))
@@ -257,11 +255,7 @@ def finger_degrees(degrees: Mapping[str, float]) -> dict[str, float]:
 
 
 def finger_effort(joint: str) -> float:
-    """Weight of a finger's joint in a person's effort, beside 1 of an elbow.
-
-    Fitted to typing, where 1.6 for flexion is best; half of it is used, because with more, grasps are found
-    less often. Of the thumb an ESTIMATE: it moves before an arm.
-    """
+    """Weight of a finger's joint in effort, beside 1 of an elbow: half of what fits typing, so grasps are found."""
     if "thumb" in joint:
         return 0.2
     return 0.8 if joint.endswith("flexion") else 0.4

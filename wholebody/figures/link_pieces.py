@@ -48,8 +48,7 @@ class LinkShape(NamedTuple):
     name: str = ""  # of the shape in the file; empty without one
 
 
-CONCAVITY = Range(0.01, 1.0)
-"""Concavity of the pieces, as a share of a mesh's size, from close pieces to hulls."""
+CONCAVITY = Range(0.01, 1.0)  # concavity of the pieces, as a share of a mesh's size, from close pieces to hulls
 
 
 def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
@@ -149,8 +148,7 @@ MANY = 4000
 FINE = 0.002  # m
 
 
-Color: TypeAlias = tuple[float, float, float, float]
-"""Red, green, blue, alpha."""
+Color: TypeAlias = tuple[float, float, float, float]  # red, green, blue, alpha
 
 
 class Drawn(NamedTuple):

@@ -11,10 +11,8 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import MOST_TURNED, warn
 from wholebody.base.errors import InputError
 
-HEAVIEST = 1e9
-"""Kilograms: greatest mass carried by one joint."""
-LARGEST = 1e6
-"""Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
+HEAVIEST = 1e9  # kilograms: greatest mass carried by one joint
+LARGEST = 1e6  # largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes
 
 
 def check_model(model: pin.Model, name: str) -> None:
@@ -65,8 +63,7 @@ def along_z(axis: Array) -> Array:
     return np.column_stack((x, np.cross(axis, x), axis))
 
 
-FAR_OUT = 1.0
-"""Radians beyond a limit from which a value was probably meant in degrees."""
+FAR_OUT = 1.0  # radians beyond a limit from which a value was probably meant in degrees
 
 
 class Turning:
@@ -151,7 +148,6 @@ def archived(model: pin.Model) -> tuple[Any, ...]:
 
 
 def _restored(archive: str, limits: dict[str, Array], followers: list[_Follower]) -> pin.Model:
-    """A model that was pickled."""
     model = pin.Model()
     model.loadFromString(archive)
     for name, values in limits.items():

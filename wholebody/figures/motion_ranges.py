@@ -66,8 +66,7 @@ class TwistRange(NamedTuple):
 
 MotionRange: TypeAlias = CoupledRange | EllipticRange | TwistRange
 
-LARGEST_ELLIPSE = 3
-"""Most angles that share one range."""
+LARGEST_ELLIPSE = 3  # most angles that share one range
 
 NECK = (
     (("neck1_flexion", "neck2_flexion"), -60.0, 50.0),

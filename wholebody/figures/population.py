@@ -23,8 +23,7 @@ from wholebody.figures.tables import table
 
 SEXES = {"male": "men", "female": "women"}
 
-UNITS = {"mass": "kg", "age": "years"}
-"""Units of the dimensions that are not lengths."""
+UNITS = {"mass": "kg", "age": "years"}  # units of the dimensions that are not lengths
 
 NEAR = 2.0
 """Years from an end of the ages. Few were measured nearer to it and nobody beyond it: they have the dimensions of those
@@ -111,8 +110,7 @@ class Population:
         off = (inverse @ given) * scale
         worst = fixed + int(np.abs(off[fixed:]).argmax())
         middle = given[worst] - off[worst] * scale[worst]
-        # Standard deviations that one dimension of a likely person is from what the others say, at most.
-        ends = []
+        ends = []  # standard deviations that one dimension of a likely person is from what the others say, at most
         for side in (-1.0, 1.0):
             deviates = np.zeros(len(self.names))
             deviates[which[worst]] = middle + side * math.sqrt(chdtri(1, RARE)) * scale[worst]

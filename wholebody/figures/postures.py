@@ -130,8 +130,7 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any, 
     # m: segments that reach as low as this above the lowest point are those that stand
     soles = [(shape, place) for shape, place, low in body if low <= bottom + 0.03]
     shift = 0.0
-    # most steps; each goes down by the least distance, so none goes through anything
-    for _ in range(2000):
+    for _ in range(2000):  # most steps; each goes down by the least distance, so none goes through anything
         gap = _least(soles, things, shift)
         if abs(gap) <= 1e-7:  # m: gap that counts as standing
             break

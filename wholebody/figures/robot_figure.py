@@ -78,7 +78,6 @@ def robot_figure(robot: Robot, samples: int) -> Figure:
 
 
 def _notes_on(rest: RestPosture) -> list[str]:
-    """Sentences on overlaps at zero."""
     notes = []
     if rest.parted:
         shown = ", ".join(f"{a} and {b}" for a, b in rest.parted[:3])

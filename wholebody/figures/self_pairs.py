@@ -18,8 +18,7 @@ from wholebody.figures.description import ExcludedPair, limits_of, zero_within_l
 from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
-SELDOM = 0.02
-"""Share of the sampled postures: pairs that are free in at most this share are left out, as nested shells."""
+SELDOM = 0.02  # share of the sampled postures: pairs that are free in at most this share are left out, as nested shells
 
 UNLIMITED = np.pi
 """Range in both directions for sampling joints without limits: radians, or metres for prismatic joints."""
@@ -125,11 +124,9 @@ def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array)
     return free
 
 
-APART = 1e-3
-"""Least distance of two pieces in the posture, metres."""
+APART = 1e-3  # least distance of two pieces in the posture, metres
 
-LONGEST_STEP = 0.25
-"""Largest change of a joint in one correction, radians or metres."""
+LONGEST_STEP = 0.25  # largest change of a joint in one correction, radians or metres
 
 DAMPING = 1e-4
 """Square metres added to the diagonal of the normal equations; larger = shorter steps along singular directions."""
@@ -198,8 +195,7 @@ class _Parting:
         """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""
         best: _Try | None = None
         since = 0
-        # corrections from one start; ordinary overlaps take three to ten.
-        for _ in range(60):
+        for _ in range(60):  # corrections from one start; ordinary overlaps take three to ten
             near = self.contacts(q, APART)
             left = tuple(np.sort(near.number[near.distance <= 0.0]).tolist())
             found = _Try(q, left, float(np.minimum(near.distance, 0.0).sum()))

@@ -191,10 +191,7 @@ class State:
         return mass, mass[:, None] * np.array(centers).reshape(-1, 3)
 
     def center_of_mass_jacobian(self, joints: range | None = None) -> Array:
-        """Jacobian of the centre of mass, shape (3, nv): of all, or of what these joints carry.
-
-        Works on data of its own, because Pinocchio's routine overwrites the joint Jacobians.
-        """
+        """(3, nv) Jacobian of the centre of mass of all, or of what joints carry; on data of its own."""
         if joints is not None:
             mass, moment = self._moments(joints)
             moved = self.support[joints.start : joints.stop].T  # a column moves what hangs on its joint

@@ -61,11 +61,8 @@ class ContactRowBuilder:
         )  # fmt: skip
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
-        """Rows of all contacts among the same pieces, to which `clearance` metres are asked, (k,) or one for all.
-
-        coal stops within 1e-6 m of the distance, which leaves its normal up to 6e-3 rad off. The face's own normal,
-        where it parts the pieces by as much, replaces it, in `contacts` too.
-        """
+        """Rows of all contacts among the same pieces, for `clearance` metres, (k,) or one for all."""
+        # coal's normal is up to 6e-3 rad off; a face's own, where it parts the pieces by as much, replaces it
         if len(contacts.placements) != len(self.table.joint):
             raise InputError(
                 f"contacts among {len(contacts.placements)} pieces are not among these {len(self.table.joint)}; ask "

@@ -58,18 +58,10 @@ class Flesh(NamedTuple):
         """Where it is in the world, with the joints at Pinocchio's placements."""
         trunk, column = divmod(self.trunk, NUMBERS)
         pieces = [geometry.geometryObjects[k] for k in (trunk, self.piece - 1, self.piece)]
-        at, limb, bent = (joints[one.parentJoint] * one.placement for one in pieces)
-        share = _share(self.sign * float(at.rotation[:, column // 3] @ limb.rotation[:, 2]))
-        straight, spread = (np.vstack([one.rotation.T, one.translation]) for one in (limb, bent))
-        rows = between(straight, spread, share)
-        return pin.SE3(rows[:3].T, rows[3])
-
-
-def _share(cosine: float) -> float:
-    share = (STRAIGHT - cosine) / (STRAIGHT - BENT)
-    if share <= 0.0 or share >= 1.0:
-        return 0.0 if share <= 0.0 else 1.0
-    return share * share * (3.0 - 2.0 * share)
+        places = [joints[one.parentJoint] * one.placement for one in pieces]
+        rows = np.array([np.vstack([at.rotation.T, at.translation]) for at in places])
+        spread((Flesh(2, NUMBERS + 6, column, self.sign),), rows, rows.reshape(-1))
+        return pin.SE3(rows[2, :3].T, rows[2, 3])
 
 
 def spread(flesh: tuple[Flesh, ...], placed: Array, flat: Any) -> None:
@@ -81,7 +73,8 @@ def spread(flesh: tuple[Flesh, ...], placed: Array, flat: Any) -> None:
             begin = NUMBERS * piece
             flat[begin : begin + NUMBERS] = flat[begin - NUMBERS : begin]
         elif cosine > BENT:
-            placed[piece] = between(placed[piece - 1], placed[piece], _share(cosine))
+            share = (STRAIGHT - cosine) / (STRAIGHT - BENT)
+            placed[piece] = between(placed[piece - 1], placed[piece], share * share * (3.0 - 2.0 * share))
 
 
 def beside_limbs(pieces: Sequence[pin.GeometryObject], reach: Array) -> Array:

@@ -23,23 +23,17 @@ TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: 
 
 SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
-MOST = 10_000_000
-"""Rows of an array that has no part of the buffer: nothing but its own count bounds them."""
+MOST = 10_000_000  # rows of an array that has no part of the buffer: nothing but its own count bounds them
 
 T = TypeVar("T")
 Color: TypeAlias = tuple[float, float, float, float]
 
 
 class GltfDocument:
-    """A file.
+    """A file: what its JSON says, `tree`, and of its nodes names and parents (k,), -1 for those on top.
 
-    Attributes:
-        tree: what its JSON says.
-        names: of the nodes; those without one, or with that of an earlier node, have a number.
-        parents: (k,) of the nodes, -1 for those on top.
-
-    Raises:
-        FileFormatError: it is no glTF 2, it is cut off, or its nodes are no trees.
+    Nodes without a name, or with that of an earlier node, have a number. FileFormatError for what is no glTF 2, is cut
+    off, or has nodes that are no trees.
     """
 
     def __init__(self, path: Path) -> None:
@@ -229,8 +223,7 @@ class GltfDocument:
         )
 
 
-KINDS = {"<f4": 5126, "u1": 5121, "<u2": 5123, "<u4": 5125}
-"""Types of numbers to their codes in a file."""
+KINDS = {"<f4": 5126, "u1": 5121, "<u2": 5123, "<u4": 5125}  # types of numbers to their codes in a file
 
 SHAPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 VERTICES, INDICES = 34962, 34963  # what a part of the buffer is for

@@ -22,8 +22,7 @@ from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 
-MOST_NEIGHBOURS = 255
-"""Most edges at one vertex that coal can represent."""
+MOST_NEIGHBOURS = 255  # most edges at one vertex that coal can represent
 
 FEW = 1000
 """Number of points up to which duplicates are dropped before the hull is made; of more points qhull drops them."""
@@ -32,16 +31,9 @@ FEW = 1000
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
     """Convex hull of points (n, 3), metres, with its origin at the centre of the smallest sphere around it.
 
-    Args:
-        points: at least four; duplicates and inner points are dropped.
-        what: name of the points, for messages.
-        vertices: (most, few): a hull with more than `most` vertices is replaced by one around it that has no more than
-            `few`, at least 8. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a
-            vertex, is replaced.
-
-    Raises:
-        InputError: not (n, 3), not finite, fewer than four different points, or thinner than `SMALLEST` in some
-            direction (flat and collinear points too).
+    `vertices` (most, few): a hull with more than `most` vertices is replaced by one around it with at most `few`, 8 or
+    more. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a vertex, is replaced.
+    InputError for fewer than four different points, or what is thinner than `SMALLEST` in some direction.
     """
     cloud = check_points(points, what)
     if len(cloud) < FEW:
@@ -237,8 +229,7 @@ def _vertices(planes: Array, inside: Array) -> Array:
     return np.asarray(found[ConvexHull(found).vertices])
 
 
-SIDES = 64
-"""Sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser."""
+SIDES = 64  # sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser
 
 SECTORS, TUBE_SIDES = 24, 12
 """Pieces of a ring, and sides of its tube: 24 and 12 are 1 % of the radius and 4 % of the tube too far out."""

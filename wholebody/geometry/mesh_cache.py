@@ -27,8 +27,7 @@ from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece, hull_triangles
 from wholebody.version import __version__
 
-VARIABLE = "WHOLEBODY_CACHE"
-"""Environment variable that names another folder for the cache."""
+VARIABLE = "WHOLEBODY_CACHE"  # environment variable that names another folder for the cache
 
 LARGEST_CACHE = 256 * 2**20  # bytes; a mesh as hull takes 3 kB, a decomposition 20 kB
 LOOKED_AT_EVERY = 64  # writes of a process between checks of the cache's size; the first write checks it too
@@ -89,10 +88,7 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
 
 
 def cached_entry(key: str, make: Callable[[], Any]) -> Any:
-    """What a function makes, from the cache, or made and cached, by the hexadecimal digest of what it is made from.
-
-    That is arrays, texts, numbers and None, and tuples and lists of these, which all come back as tuples.
-    """
+    """What a function makes of arrays, texts, numbers, None and tuples of these, cached by its digest."""
     global _writes
     path = cache_folder() / f"{key}{_SUFFIX}"
     found = _read(path)
@@ -139,8 +135,7 @@ def _read(path: Path) -> Any:
         path.unlink(missing_ok=True)
         return None
     with suppress(OSError):
-        # Least seconds between two updates of an entry's time of use.
-        if time.time() - path.stat().st_mtime > 3600.0:
+        if time.time() - path.stat().st_mtime > 3600.0:  # least seconds between two updates of an entry's time of use
             os.utime(path)
     return found
 

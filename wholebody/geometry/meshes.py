@@ -33,15 +33,11 @@ class EmptyMeshError(FileFormatError):
 
 
 def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
-    """Read all triangles of an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file, every object at its placement.
+    """Vertices (n, 3) and faces (m, 3) of an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file, every object placed.
 
-    Returns:
-        vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is converted to
-        metres, and its up axis is ignored, as in the tools of ROS.
-
-    Raises:
-        FileFormatError: missing, empty, of another kind, damaged, without triangles, or not finite.
-        MissingPackageError: for a COLLADA file, pycollada is not installed.
+    They have the file's units and axes; a COLLADA file that names its unit is converted to metres, and its up axis is
+    ignored, as in the tools of ROS. FileFormatError for a file without triangles, or damaged; MissingPackageError for
+    COLLADA without pycollada.
     """
     path = Path(path)
     if (bent := _bent(path)) is not None:
@@ -165,8 +161,7 @@ def _bytes_of_stl(path: Path) -> int | None:
     """How many bytes a binary STL has by its own count of triangles; None for other files."""
     with path.open("rb") as file:
         head = file.read(512)
-    # some binary ones begin with "solid" too
-    text = head.lstrip()[:5].lower() == b"solid" and b"\0" not in head
+    text = head.lstrip()[:5].lower() == b"solid" and b"\0" not in head  # some binary ones begin with "solid" too
     if path.suffix.lower() != ".stl" or len(head) < 84 or text:
         return None
     return 84 + 50 * int.from_bytes(head[80:84], "little")

@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.geometry.pieces import COAL_ACCURACY, SweptPoints, normal_across, swept_points
 
-Placed: TypeAlias = tuple[Any, pin.SE3]
-"""A coal geometry and its placement in the world."""
+Placed: TypeAlias = tuple[Any, pin.SE3]  # a coal geometry and its placement in the world
 
 MOST_POINTS = 20_000
 """Number of vertices of a Minkowski difference above which its sides are sampled instead of enumerated."""
 
 
-OVERLAP = 2.0 * COAL_ACCURACY
-"""Depth up to which a pair counts as touching, metres: twice coal's own tolerance."""
+OVERLAP = 2.0 * COAL_ACCURACY  # depth up to which a pair counts as touching, metres: twice coal's own tolerance
 
 
 class _Body:

@@ -140,11 +140,8 @@ def _in_band(
     size: tuple[float, float],
     found: tuple[Array, Array],
 ) -> int:
-    """Points of a piece that lie in the band below the plane of contact: how many there are.
-
-    `size`: its radius and the width of the band. Of each point it writes by how much it lies below the plane (n,), and
-    its lever (3, n): the vector from the witness point to it within the plane.
-    """
+    """How many points of a piece lie in the band below the plane of contact, with depths (n,) and levers (3, n) [m]."""
+    # `size`: radius and width of the band; a lever goes from the witness point to it, within the plane
     radius, band = size
     drop, lever = found
     down = np.empty(3)

@@ -123,16 +123,14 @@ def object_penetrations(
     return sorted(filter(None, found), key=lambda one: -float(np.linalg.norm(one.separation)))
 
 
-TOUCHING = 1e-7
-"""Overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`."""
+TOUCHING = 1e-7  # overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`
 
 
 MOST_DESCENTS, MOST_ROWS = 30, 40
 """Most rounds of a local search, and rows of its QP; both are far fewer unless rounding causes cycles."""
 
 
-SHORTEST = 2e-4
-"""Least step of a march along a ray, metres; narrower free gaps may be missed."""
+SHORTEST = 2e-4  # least step of a march along a ray, metres; narrower free gaps may be missed
 
 
 class Separation(NamedTuple):

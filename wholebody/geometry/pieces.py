@@ -28,8 +28,7 @@ COAL_ACCURACY = 1e-6  # m: of coal's distances
 
 ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size of its box
 
-LARGEST = 1e4
-"""Greatest extent of a piece, metres: coal's distances are still right to micrometres there."""
+LARGEST = 1e4  # greatest extent of a piece, metres: coal's distances are still right to micrometres there
 
 
 class Piece(NamedTuple):

@@ -18,11 +18,9 @@ from wholebody.base.errors import InputError
 PlacementLike: TypeAlias = Sequence[float] | NDArray[np.float64] | pin.SE3
 """(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 homogeneous matrix, or a ``pinocchio.SE3``."""
 
-FARTHEST = 1e6
-"""Largest distance of a placement from the origin, metres; beyond it rounding exceeds coal's accuracy."""
+FARTHEST = 1e6  # largest distance of a placement from the origin, metres; beyond it rounding exceeds coal's accuracy
 
-ROUNDING = 1e-3
-"""Largest error of a rotation: numbers with four digits are repaired, larger errors are refused."""
+ROUNDING = 1e-3  # largest error of a rotation: numbers with four digits are repaired, larger errors are refused
 
 
 _UPRIGHT = np.eye(3)

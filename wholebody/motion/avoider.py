@@ -35,8 +35,7 @@ class AvoidProgress(NamedTuple):
     note: str
 
 
-Progress = Callable[[AvoidProgress], Any]
-"""Called now and then; if it returns True, the method ends with what it has."""
+Progress = Callable[[AvoidProgress], Any]  # called now and then; if it returns True, the method ends with what it has
 
 
 class Watch:
@@ -200,12 +199,7 @@ class Avoider(Protocol):
         """The strength within which it keeps torques; None where it looks at none."""
 
     def avoid(self, run: Run) -> MethodResult:
-        """Free a clip; where the caller ends the run, with what there is then.
-
-        Raises:
-            InputError: a setting does not fit the clip.
-            UnknownNameError: a setting names what the figure does not have.
-        """
+        """Free a clip; where the caller ends the run, with what there is. InputError for settings that do not fit."""
 
 
 def has_setting(method: object, name: str) -> bool:

@@ -21,14 +21,12 @@ from wholebody.motion.stance import Sliding, sliding
 from wholebody.scene.moving_obstacles import MovingScene
 from wholebody.scene.scene import Scene
 
-DEPTH = 1e-4
-"""Depth up to which an overlap is no contact, metres: that of sweeps, a tenth of a millimetre."""
+DEPTH = 1e-4  # depth up to which an overlap is no contact, metres: that of sweeps, a tenth of a millimetre
 
 SMALLEST, LARGEST = 1e-5, 1.0  # m, of the tolerance; ten times coal's own accuracy
 ROUNDING = 1e-9  # rad, m: by which a limit may be missed; share by which a speed may be
 
-Progress = Callable[[int], object]
-"""Called with the number of frames that are done."""
+Progress = Callable[[int], object]  # called with the number of frames that are done
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ ROOT_SIZE = 7  # values of a free root
 LARGEST = 1e6  # of a value, radians or metres
 MOST_FRAMES = 1_000_000  # of a clip: ten hours at 30 frames a second; more would be gigabytes
 DRAWN = 8  # joints of `Clip.plot`
-ROUNDING = 1e-9
-"""Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
+ROUNDING = 1e-9  # share of a time step by which a time may be outside of a clip: the rounding of sums of steps
 SAME = 0.01  # of a time step: files write 0.0333333 s for a thirtieth, and their last frame is then there too
 
 
@@ -168,18 +167,7 @@ class Clip(Shown):
         slack = ROUNDING * self.dt * len(self)
         if not -slack <= t <= self.duration + slack:
             raise InputError(f"{self.name}: t is {t:g} s; give a time from 0 to {self.duration:g} s")
-        return self._between(t / self.dt)
-
-    def _between(self, place: float) -> Array:
-        """Posture at a number of frames from the first one, which need not be whole."""
-        first = int(np.clip(np.floor(place), 0, max(0, len(self) - 2)))
-        share = float(np.clip(place - first, 0.0, 1.0))
-        if share <= ROUNDING or len(self) == 1:
-            return np.array(self.q[first])
-        if share >= 1.0 - ROUNDING:
-            return np.array(self.q[first + 1])
-        found: Array = pin.interpolate(self.figure.model, self.q[first], self.q[first + 1], share)
-        return found
+        return np.array(between(self.figure.model, self.q, np.array([t / self.dt]))[0])
 
     def resampled(self, dt: float, *, smooth: bool = False) -> Clip:
         """The clip at another time step, seconds, interpolated on the configuration manifold.
@@ -198,10 +186,10 @@ class Clip(Shown):
         frames = int(np.floor(self.duration / dt + SAME)) + 1
         if frames > MOST_FRAMES:
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
-        places = [min(k * dt / self.dt, len(self) - 1.0) for k in range(frames)]
+        places = np.minimum(np.arange(frames) * dt / self.dt, len(self) - 1.0)
         things = {name: np.array([_placed(track, place) for place in places]) for name, track in self.things.items()}
-        q = splined(self.figure, self.q, np.array(places)) if smooth else [self._between(place) for place in places]
-        return Clip(self.figure, np.array(q), dt, self.name, things)
+        q = splined(self.figure, self.q, places) if smooth else between(self.figure.model, self.q, places)
+        return Clip(self.figure, q, dt, self.name, things)
 
     def mirrored(self) -> Clip:
         """The clip with left and right exchanged, mirrored at the plane y = 0 of the world.
@@ -327,6 +315,18 @@ class Clip(Shown):
         return write_motion(self, path, bare=bare)
 
 
+def between(model: pin.Model, q: Array, places: Array) -> Array:
+    """(m, nq) postures at places (m,) of postures (n, nq): at 0.5 in the middle of the first motion between two."""
+    first = np.clip(np.floor(places).astype(int), 0, max(0, len(q) - 2))
+    shares = np.clip(places - first, 0.0, 1.0 if len(q) > 1 else 0.0)
+    return np.array([
+        q[k] if share <= ROUNDING
+        else q[k + 1] if share >= 1.0 - ROUNDING
+        else pin.interpolate(model, q[k], q[k + 1], share)
+        for k, share in zip(first, shares, strict=True)
+    ])  # fmt: skip
+
+
 def same_joints(clip: Clip, figure: Figure, what: str) -> None:
     """Raise `InputError` if a figure does not take the postures of a clip."""
     if figure.joints != clip.names or figure.model.nq != clip.q.shape[1]:
@@ -352,11 +352,7 @@ def column_name(figure: Figure, column: int) -> str:
 
 
 def thing_tracks(given: Mapping[str, Iterable[PlacementLike]], frames: int, what: str) -> dict[str, Array]:
-    """Placements (n, 7) of things by name, checked; `what` names the input in messages.
-
-    Raises:
-        InputError: another number of placements than frames, or one that cannot be read; the frame is named.
-    """
+    """Placements (n, 7) of things by name, or an InputError that names `what` and the frame."""
     found = {}
     for name, track in given.items():
         checks.text(name, f"{what}: the name of a thing")

@@ -89,8 +89,7 @@ class Torques:
     def share(self) -> Array:
         """(n, nv) torque as a share of the strength in its direction; more than 1 is more than the person can."""
         limit = np.where(self.torque >= 0.0, self.upper, -self.lower)
-        found: Array = np.abs(self.torque) / limit
-        return found
+        return np.asarray(np.abs(self.torque) / limit)
 
     @property
     def largest_share(self) -> float:
@@ -248,8 +247,7 @@ def _pressure(pressed: Array, points: Array) -> Array:
     load = float(pressed.sum())
     if load <= 0.0:
         return np.zeros(3)
-    found: Array = pressed @ points / load
-    return found
+    return np.asarray(pressed @ points / load)
 
 
 TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 1 mm away, and avoiders keep a clearance
@@ -258,11 +256,7 @@ TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 
 def bearing(
     clip: Clip, q: Array, feet: Mapping[str, Mask], scene: Scene | None, friction: float
 ) -> tuple[InverseDynamics, tuple[str, ...], list[Stand]]:
-    """What bears the frames of a clip at smoothed postures q (n, nq), on feet in frames (n,) where they stand.
-
-    Returns the dynamics on the feet and on the segments that touch things, the names of both, and where each frame
-    stands. Without a scene, or with a root that is fixed, nothing else touches.
-    """
+    """Dynamics on feet and what else touches the scene at q (n, nq), names of both, and where frames stand."""
     figure, names, touches = clip.figure, tuple[str, ...](), list[Touches]()
     if scene is not None and figure.root == "free":
         names, touches = touching_parts(clip, scene, feet)
@@ -276,10 +270,7 @@ def bearing(
 
 
 def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tuple[str, ...], list[Touches]]:
-    """Segments other than feet that touch things of a scene, and where they do in each frame.
-
-    Things that move in the clip bear nothing: what they weigh is not known.
-    """
+    """Segments other than feet that touch things of a scene that stand, and where they do in each frame."""
     figure, owners, slow = clip.figure, scene.piece_owner, RestLimits().speed
     model, data = figure.model, figure.model.createData()
     carrier = {name: name for name in figure.segments}

@@ -17,6 +17,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import a, listed
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
+from wholebody.motion.clip import between
 from wholebody.motion.grips import grip_shifts
 from wholebody.motion.measures import MotionBounds
 from wholebody.motion.resting_hands import RestingHands, resting_hands
@@ -262,11 +263,3 @@ def _label(term: HeldTerm | Bound) -> str:
     """A short name of a term: its class and its frame or joints."""
     frame = getattr(term, "frame", None)
     return f"{type(term).__name__}({frame!r})" if isinstance(frame, str) else repr(term)
-
-
-def between(model: pin.Model, q: Array, places: Array) -> Array:
-    """(m, nq) postures at places (m,) of postures (n, nq): at 0.5 in the middle of the first motion between two."""
-    first = np.clip(np.floor(places).astype(int), 0, max(0, len(q) - 2))
-    shares = np.clip(places - first, 0.0, 1.0)
-    after = np.minimum(first + 1, len(q) - 1)
-    return np.array([pin.interpolate(model, q[k], q[m], s) for k, m, s in zip(first, after, shares, strict=True)])

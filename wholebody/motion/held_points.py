@@ -60,11 +60,7 @@ def touching_points(
     wanted: Iterable[tuple[str, float, int]],
     joints: Mapping[str, str],
 ) -> list[HeldPoint]:
-    """The points of a figure that touch things: of a hand as far from the wrist as the skeleton's joint is.
-
-    `wanted` are their roles, shares and bases, `joints` those of the skeleton's roles; the end of the arm touches of a
-    figure without hands.
-    """
+    """Points that touch things: of a hand as far from the wrist as the skeleton's; `wanted`: roles, shares, bases."""
     found, data, own = [], figure.model.createData(), figure_roles(figure)
     pin.framesForwardKinematics(figure.model, data, upright(figure))
     placed = roles.places(figure)
@@ -98,10 +94,7 @@ def _end(figure: Figure, joint: int) -> tuple[int, Array]:
 
 
 def _sole(figure: Figure, data: pin.Data, roles: Roles, side: str, told: str) -> list[HeldPoint]:
-    """Of the heel, and of the front, which rests as the role `told` does: what rests, and the edge at both sides.
-
-    What rests is where the joint of the skeleton is slow: below the ankle, and the hinge of toes, which lie flat.
-    """
+    """Heel and front of a sole, where the skeleton's joint is slow, and both edges; the front rests as role `told`."""
     own, ankle, heel = roles.places(figure), f"{side}_ankle", f"{side}_heel"
     frame = heel if heel in figure.frames else roles.frames[ankle]
     foot = int(figure.model.frames[figure.frame_id(frame)].parentJoint)

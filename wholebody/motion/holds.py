@@ -47,10 +47,7 @@ class Touched:
         return pin.SE3.Identity() if contact.base else self.things.at(contact.thing, frame)
 
     def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
-        """(3,) where a point is held in a thing's axes, by the thickness of the part on the side that touches it.
-
-        A part without pieces has none: its point is as far away as the skeleton's place is.
-        """
+        """(3,) where a point is held in a thing's axes, off it by the thickness of its part on that side."""
         pin.forwardKinematics(self._figure.model, self._data, q)
         normal = self._data.oMi[contact.base].rotation @ self.at(contact, contact.first).rotation @ contact.normal
         pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
@@ -70,10 +67,7 @@ class Touched:
         return least_distance(own, other)
 
     def _part(self, joint: int, center: Array, radius: float, most: int = 100) -> list[Placed]:
-        """What a joint carries, see `_carried`; where that is nothing, a ball about a place (3,), and the limb before.
-
-        The limb may reach beyond the place: then it is what touches.
-        """
+        """What a joint carries; where that is nothing, a ball about a place (3,), and the limb before it."""
         if carried := self._carried(joint, most):
             return carried
         ball = coal.Sphere(max(radius, 1e-6)), self._data.oMi[joint] * pin.SE3(np.eye(3), center)
@@ -133,10 +127,7 @@ class Holds:
         self._let_go: set[tuple[int, int]] = set()  # the same of all runs, with what is too short to be held between
 
     def lost(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> bool:
-        """Whether points (h, 3) are too far from the things that they are to touch; these are let go of in the frame.
-
-        `held` are the goals and weights of the frame; those of what is let go of become zero.
-        """
+        """Whether points (h, 3) are too far from their things; then their goals and weights in `held` become zero."""
         self._gone -= {each for each in self._gone if each[1] == frame}
         for number, stand in self._touches(frame, held[1]):
             normal, gap, off = self._met(number, stand, frame, q, places, held[0])
@@ -146,10 +137,8 @@ class Holds:
         return any(each[1] == frame for each in self._gone)
 
     def touch(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> None:
-        """Move goals along the normals of things to where the points (h, 3) of a posture would be if parts touched.
-
-        How thick a part is there depends on how it is turned; it turns little if goals move no more than they need to.
-        """
+        """Move goals along the normals of things to where the points (h, 3) of a posture would be if parts touched."""
+        # a part is as thick as it is turned; it turns little if goals move no more than they need to
         for number, stand in self._touches(frame, held[1]):
             normal, gap, way = self._met(number, stand, frame, q, places, held[0])
             off = float(normal @ way) + CLEARANCE - gap
@@ -248,11 +237,8 @@ class Holds:
     def goals(
         self, frame: int, paths: Mapping[int, Array], shift: Array, again: bool = False, span: int = 1
     ) -> tuple[Array, Array]:
-        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body.
-
-        Of every `span`-th frame the last one before a rest and the first one after it are at rest too, so that what
-        lies between two of these frames is.
-        """
+        """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
+        # of every `span`-th frame those beside a rest are at rest too, so that what lies between them is
         down, strong = self._facing_down(paths[frame]), STRONG / self._dt**2 if again else FIRM / (span * self._dt)
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
@@ -298,10 +284,7 @@ class Holds:
     def _swing(
         self, number: int, frame: int, nearest: list[int], places: list[Array], paths: Mapping[int, Array]
     ) -> tuple[Array, float]:
-        """Where a point (3,) is to be between rests, and how near in time it is to one, from 0 to 1.
-
-        Its way is led from one rest to the next; it comes to rest, and starts, slowly. `nearest` are their frames.
-        """
+        """Where a point (3,) is to be between rests at frames `nearest`, and how near in time it is, 0 to 1."""
         for near in nearest:
             if (number, near) not in self._ways:
                 self._ways[number, near] = np.array(paths[near][number])
@@ -331,10 +314,7 @@ class Holds:
         return found
 
     def landed(self, frame: int, places: Array, held: tuple[Array, Array], span: int) -> None:
-        """Keep points where they came down, (h, 3), if a rest begins in the `span` frames from this one on.
-
-        Contact may have kept them off. What touches a thing goes on where the goals of the frame say.
-        """
+        """Keep points (h, 3) where they came down, if a rest begins in `span` frames; on a thing, at the goal."""
         for number, stands in enumerate(self._stands):
             stand = next((each for each in stands if frame <= each.first < frame + span), None)
             if isinstance(stand, Foothold):

@@ -38,10 +38,7 @@ class GroundForces(NamedTuple):
 def ground_forces(
     wrench: Array, about: Array, points: Array, friction: float, axes: Array | None = None
 ) -> GroundForces:
-    """Forces at points (p, 3), within cones of friction about axes (p, 3), that give a wrench (6,) as nearly.
-
-    The wrench is about a point (3,); without axes the cones point up.
-    """
+    """Forces at points (p, 3) in cones about axes (p, 3), or up, nearest to a wrench (6,) about a point (3,)."""
     # Least |wrench's error|^2 + (e |forces|)^2 over edges of pyramids (Lawson and Hanson 1974, chapter 23).
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
@@ -106,8 +103,7 @@ class Stand(NamedTuple):
 
     def margins(self, place: Array) -> Array:
         """(e,) distances of a place (2,) from the edges, metres; positive inside."""
-        found: Array = self.normals @ place - self.offsets
-        return found
+        return np.asarray(self.normals @ place - self.offsets)
 
 
 class Loads(NamedTuple):
@@ -127,25 +123,19 @@ class Derivatives(NamedTuple):
 
 
 class InverseDynamics:
-    """Loads of frames of one figure, with mass, on feet that may stand, and on other joints that may touch things.
-
-    Attributes:
-        feet: names of the segments or frames that may stand; none for a root that is fixed.
-        joints: of the feet, and after them those that touch.
-        weight: N.
-    """
+    """Loads of frames of one figure, with mass, on feet that may stand, and on other joints that may touch things."""
 
     def __init__(self, figure: Figure, feet: Sequence[str], friction: float, touching: Sequence[int] = ()) -> None:
         one_figure(figure, "dynamics: the figure")
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
-        self.feet = tuple(feet)
+        self.feet = tuple(feet)  # names of the segments or frames that may stand; none for a root that is fixed
         joints = [int(figure.model.frames[figure.frame_id(foot)].parentJoint) for foot in self.feet]
         self._soles = [pieces_on(figure, joint) for joint in joints]
         for foot, joint, pieces in zip(self.feet, joints, self._soles, strict=True):
             if joint == 0 or not pieces:
                 raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
-        self.joints = [*joints, *touching]
-        self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))
+        self.joints = [*joints, *touching]  # of the feet, and after them those that touch
+        self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))  # N
         self.free = figure.root == "free"
 
     def stand(self, q: Array, feet: Sequence[bool], touches: Touches | None = None) -> Stand:
@@ -305,14 +295,12 @@ def zero_moment_point(wrench: Array, height: float) -> Array:
     """(2,) where the ground gives a wrench (6,) without a horizontal moment, metres; its vertical force is not zero."""
     # Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life"
     force, turning = wrench[:3], wrench[3:]
-    found: Array = np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2]
-    return found
+    return np.asarray(np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2])
 
 
 def moved(wrench: Array, center: Array) -> Array:
     """A wrench (6,) about another point than the world's origin."""
-    found: Array = np.concatenate([wrench[:3], wrench[3:] - cross(center, wrench[:3])])
-    return found
+    return np.asarray(np.concatenate([wrench[:3], wrench[3:] - cross(center, wrench[:3])]))
 
 
 def moving(center: Array) -> Array:

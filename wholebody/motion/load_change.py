@@ -16,11 +16,9 @@ from wholebody.motion.clip_torques import Torques
 TORQUE = 0.02
 """Share of its bound by which a torque may be beyond it: what filters and the frames in which feet stand change."""
 
-PLACE = 2e-3
-"""Metres by which the zero moment point may be farther outside, for the same reason."""
+PLACE = 2e-3  # metres by which the zero moment point may be farther outside, for the same reason
 
-FORCE = 0.05
-"""Share of the weight by which the ground may lack more force."""
+FORCE = 0.05  # share of the weight by which the ground may lack more force
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,33 +48,24 @@ class LoadChange:
 
     @property
     def farther(self) -> Array:
-        """(m,) by how much farther the zero moment point is outside of the support than it was before, metres.
-
-        A frame between two of those before is compared with the worse of both, and a foot stands there before if it
-        stands in both. It is 0 where other feet stand than before, or other parts touch: the support is another one.
-        """
+        """(m,) by how much farther [m] the zero moment point is out than before, or than the worse of two frames."""
+        # 0 where other feet stand than before, or other parts touch: the support is another one
         old, last = self.before, len(self.before.outside) - 1
         first, second = (np.clip(near(self.times).astype(int), 0, last) for near in (np.floor, np.ceil))
         was, now = (_marks(loads, (*old.feet, *self.after.feet)) for loads in (old, self.after))
         same = ((was[first] & was[second]) == now).all(axis=1)
         past = self.after.outside - np.maximum(old.outside[first], old.outside[second])
-        found: Array = np.where(same, np.maximum(past, 0.0), 0.0)
-        return found
+        return np.asarray(np.where(same, np.maximum(past, 0.0), 0.0))
 
     @property
     def unsupported(self) -> Array:
-        """(m,) share of the weight by which the ground lacks more of the force that the motion needs than before.
-
-        It is compared with the largest lack before within 0.1 s, as feet may leave the ground so much earlier or later.
-        Feet that no longer stand give nothing, and a flight that is slowed needs a force.
-        """
+        """(m,) share of the weight that the ground lacks beyond the most that it lacked before within 0.1 s."""
         old, new = (np.linalg.norm(loads.missing[:, :3], axis=1) for loads in (self.before, self.after))
         reach, figure = max(1, round(0.1 / self.after.dt)), self.after.figure
         near = sliding_window_view(np.pad(old, reach), 2 * reach + 1).max(axis=1)
         places = np.clip(np.rint(self.times).astype(int), 0, len(old) - 1)
         weight = pin.computeTotalMass(figure.model) * float(np.linalg.norm(figure.model.gravity.linear))
-        found: Array = np.maximum(new - near[places], 0.0) / max(weight, np.finfo(float).tiny)
-        return found
+        return np.asarray(np.maximum(new - near[places], 0.0) / max(weight, np.finfo(float).tiny))
 
     @property
     def missed(self) -> list[str]:

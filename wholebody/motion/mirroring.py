@@ -12,8 +12,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 
-MIRROR = np.diag([1.0, -1.0, 1.0])
-"""Reflection at the plane y = 0."""
+MIRROR = np.diag([1.0, -1.0, 1.0])  # reflection at the plane y = 0
 
 PLACEMENT = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
 """The same of a placement (7,): (x, -y, z), and of a rotation R, which becomes M R M, the x and z of the axis."""
@@ -41,11 +40,7 @@ def other_side(name: str) -> str:
 
 
 def mirrored(figure: Figure, q: Array) -> Array:
-    """Postures (n, nq) with left and right exchanged, mirrored at the plane y = 0 of the world.
-
-    Raises:
-        InputError: the figure is not symmetric to y = 0 of its root, or has joints of more than one degree of freedom.
-    """
+    """Postures (n, nq) mirrored at the plane y = 0; InputError for a figure that is not symmetric, or ball joints."""
     source, sign = _exchange(one_figure(figure, "mirrored: the clip's figure"))
     found: Array = q[:, source] * sign
     if figure.root == "free":

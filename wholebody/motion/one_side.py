@@ -79,10 +79,7 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
 
 
 def followed(run: Run, window: Window, middle: int, begun: Array | None = None) -> Array:
-    """Postures (n, nq) of a window, followed from one of its frames until calm for 0.25 s.
-
-    That frame begins at a posture (nq,), or at its own one freed.
-    """
+    """Postures (n, nq) of a window, followed from a frame, at `begun` (nq,) or freed, until calm for 0.25 s."""
     terms = run.terms
     q = np.array(terms.q[window.first : window.end])
     q[middle - window.first] = run.follower.freed(middle, terms.q[middle]) if begun is None else begun

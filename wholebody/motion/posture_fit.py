@@ -170,10 +170,7 @@ class Fitter:
         midway: Sequence[Midway] = (),
         within: float = WITHIN,
     ) -> Array:
-        """The posture (nq,) after one program from q (nq,); `most` (2, nv) displacements, contacts only if `among`.
-
-        Pairs `within` metres have rows.
-        """
+        """The posture (nq,) after one program; `most` (2, nv) displacements, rows of pairs `within` [m] if `among`."""
         self._state.update(q)
         near = self._workspace.proximity.query(self._state.data, within) if among else None
         places = self._places()
@@ -291,10 +288,7 @@ class Fitter:
         return np.concatenate([self._bones @ points.ravel(), held.ravel(), angles])
 
     def _curvature(self, errors: Array, goals: Goals) -> Array:
-        """(nv,) bounds of what the rows leave out: a turn's second derivative times what a point without pieces misses.
-
-        Without it a step turns wrists far for millimetres, as their levers are short, and the next one turns them back.
-        """
+        """(nv,) bounds of what rows leave out: else wrists, with short levers, turn far for millimetres."""
         first, weights = len(self._bones), goals.held_weights.ravel()[self._bare]
         pull = np.abs(errors[first : first + goals.held.size][self._bare] * weights).max(initial=0.0)
         return np.asarray(LEAST_LEVER * pull * self._turning)
@@ -357,8 +351,7 @@ def layout_of(points: list[str], turns: list[str], roles: Roles, figure: Figure,
     weights = [BONES.get(end.split("_")[-1], 1.0) for _, end in pairs]
     if figure.root == "free" and has_trunk(roles.joints) and "hips" in place:
         rows.append(place["hips"])
-        # weight of the place of the hips; 1 is that of a bone
-        weights.append(0.3)
+        weights.append(0.3)  # weight of the place of the hips; 1 is that of a bone
     else:  # what is known says where it is
         rows += [place[role] for role in points]
         weights += [1.0] * len(points)

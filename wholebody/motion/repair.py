@@ -41,8 +41,7 @@ def repaired(run: Run, q: Array) -> Array:
     q = one_sided(run, np.array(q))
     for number in range(SETTINGS.rounds):
         found = run.faults(q)
-        # what rows cannot free, and later what they did not free
-        deep = SHALLOW if number else SETTINGS.through
+        deep = SHALLOW if number else SETTINGS.through  # what rows cannot free, and later what they did not free
         changed = [_kept_back(run, q, gap, deep) for gap in found.gaps]
         if run.ended:
             return q

@@ -135,7 +135,6 @@ def _joint(scene: Scene, name: str) -> int:
 
 
 def _after(figure: Figure, joint: int) -> set[int]:
-    """A joint and those after it."""
     return {other for other in range(figure.model.njoints) if joint in figure.model.supports[other]}
 
 

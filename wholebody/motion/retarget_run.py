@@ -238,11 +238,7 @@ class Run:
         self._free[k], self._paths[k] = self.free[k], self.fitter.held(self.free[k])
 
     def _mean(self, values: dict[int, Array], k: int, weights: Array, span: int = 1) -> Array:
-        """The value at a frame of the line that is nearest to those about it: inside, their mean.
-
-        With positive weights a mean is within the limits that the values are within, and changes no faster: nothing is
-        cut off afterwards, which would leave corners.
-        """
+        """The value at a frame of the line nearest to those about it: inside, their mean."""
         half, last = len(weights) // 2, self._came - 1
         away = np.arange(max(-half, -k // span), (min(half, (last - k) // span) if self.ended else half) + 1)
         near = leaning(weights[away + half], away)

@@ -20,15 +20,12 @@ from wholebody.motion.skeleton import RIGID, SkeletonMotion
 from wholebody.motion.standing_ground import Ground
 from wholebody.motion.structure import LIMBS, upright
 
-SMALL = 1e-9
-"""Metres: shorter vectors have no direction."""
+SMALL = 1e-9  # metres: shorter vectors have no direction
 
 
-UPRIGHT = 0.7
-"""Cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands."""
+UPRIGHT = 0.7  # cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands
 
-ALIKE = 0.9
-"""Length of the mean of directions that are one direction, with the errors of a recording."""
+ALIKE = 0.9  # length of the mean of directions that are one direction, with the errors of a recording
 
 
 class Targets(NamedTuple):
@@ -220,8 +217,7 @@ def _ratio(own: _Body, source: _Body, first: str, second: str) -> float:
 
 def _directed(own: _Body, source: _Body, first: str, second: str, start: Array) -> Array:
     """(n, 3) from a start along the skeleton's way from one role to another, at the figure's length."""
-    found: Array = start + source.way(first, second) * _ratio(own, source, first, second)
-    return found
+    return np.asarray(start + source.way(first, second) * _ratio(own, source, first, second))
 
 
 def known_bones(limb: tuple[str, ...], side: str, roles: Collection[str]) -> list[tuple[str, str]]:
@@ -303,8 +299,7 @@ def _hand_turn(motion: SkeletonMotion, joint: dict[str, int], side: str, axes: A
     fingers = fingers / np.linalg.norm(fingers)
     inward = (-1.0 if side == "left" else 1.0) * axes[:, 1]
     palm = inward if abs(fingers @ axes[:, 2]) > UPRIGHT else -axes[:, 2]  # hanging arms, or arms out with palms down
-    turned: Array = motion.rotations[:, motion.parents[hand]] @ _frame(fingers, palm)
-    return turned
+    return np.asarray(motion.rotations[:, motion.parents[hand]] @ _frame(fingers, palm))
 
 
 def _frame(along: Array, towards: Array) -> Array:
@@ -357,11 +352,7 @@ def soled(motion: SkeletonMotion, joint: Mapping[str, int], known: Mapping[str, 
 
 
 def flat_turns(motion: SkeletonMotion, roles: Roles, stands: Mapping[str, Mask]) -> dict[str, Array]:
-    """Rotations (3, 3) in the ankles' axes, by role, from the foot of the rest posture to one that is flat where it is.
-
-    Rest postures have feet that are rolled by 20 degrees, where the legs are apart. While ankle and toe both stand (n,)
-    the sole is flat.
-    """
+    """Rotations (3, 3) in ankles' axes by role, from the rest posture's foot to a flat one, of standing frames (n,)."""
     found = {}
     for side in ("left", "right"):
         ankle, toe = f"{side}_ankle", f"{side}_toe"

@@ -151,8 +151,7 @@ def _parents(value: object, name: str) -> Indices:
     found = checked_array(value, f"{name}: parents", "an index for each joint")
     if found.ndim != 1 or not len(found) or found[0] != -1 or not all(0 <= p < k for k, p in enumerate(found[1:], 1)):
         raise InputError(f"{name}: parents are indices of joints before their children; give -1 for the first alone")
-    parents: Indices = found.astype(np.intp)
-    return parents
+    return np.asarray(found.astype(np.intp))
 
 
 def longest_way(parents: Indices, offsets: Array) -> float:

@@ -187,8 +187,7 @@ def _winding(corners: Array, xs: Array, ys: Array, zs: Array) -> Array:
             below = np.searchsorted(zs, z[hit])  # the points of the column below the face
             rows, columns = np.nonzero(hit)
             np.add.at(crossed, (rows + i.start, columns + j.start, below), np.sign(area))
-    counted: Array = np.cumsum(crossed[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 1:]
-    return counted
+    return np.asarray(np.cumsum(crossed[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 1:])
 
 
 def _fitted(grid: _Grid, count: int, seed: int) -> tuple[Array, Array, int, int]:
@@ -240,8 +239,7 @@ def _best_radius(inside: Array, outside: Array, grid: _Grid) -> float:
 
 def _gap(points: Array, centers: Array, radii: Array) -> Array:
     """(k,) distance of points from the nearest sphere; negative inside."""
-    gap: Array = (np.linalg.norm(points[:, None] - centers, axis=2) - radii).min(axis=1)
-    return gap
+    return np.asarray((np.linalg.norm(points[:, None] - centers, axis=2) - radii).min(axis=1))
 
 
 def _signed_depth(points: Array, vertices: Array, faces: Faces) -> Array:

@@ -30,8 +30,7 @@ from wholebody.motion.windows import Window, runs
 from wholebody.tasks import Hold
 
 FEET = ("left_foot", "right_foot")
-POINTS = ("heel", "ball", "toe_tip")
-"""Ends of the names of frames that are points of a foot."""
+POINTS = ("heel", "ball", "toe_tip")  # ends of the names of frames that are points of a foot
 
 
 def foot_points(figure: Figure) -> tuple[str, ...]:
@@ -251,8 +250,7 @@ def _push(first: _Foot, second: _Foot, frames: Sequence[dict[str, pin.SE3]], bef
         if least >= (apart_by if far else 0.0):
             break
         far += max(apart_by - least, 1e-4)
-    found: Array = far * way
-    return found
+    return np.asarray(far * way)
 
 
 def _middle(foot: _Foot, places: dict[str, pin.SE3]) -> Array:

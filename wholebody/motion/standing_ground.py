@@ -167,8 +167,7 @@ class Ground(Checked):
         return os.fspath(target)
 
 
-NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)
-"""The ground of what never rests."""
+NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)  # the ground of what never rests
 
 
 def ground(

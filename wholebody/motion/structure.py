@@ -90,10 +90,7 @@ def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -
 
 
 def built(motion: SkeletonMotion, stands: bool = False) -> dict[str, str]:
-    """Role to joint of a skeleton by its structure; empty where it is no person's.
-
-    What `stands` has its legs below, and may have no arms.
-    """
+    """Role to joint of a skeleton by its structure; empty where it is no person's. What `stands` may have no arms."""
     pairs = limb_pairs(motion.parents, motion.offsets, 1 if stands else 2)
     if not pairs:
         return {}
@@ -188,10 +185,7 @@ class Part(NamedTuple):
 
 
 def built_figure(figure: Figure) -> dict[str, Part]:
-    """Parts of a figure by role, by its limbs at its zero; empty where it is no person's, as a quadruped's.
-
-    A part is where the axes of its joints meet; a wrist is the end of a forearm that ends without a joint.
-    """
+    """Parts of a figure by role, where the axes of their joints meet at its zero; empty where it is no person's."""
     # Joints of one place are one, and a hinge is anywhere along its axis: that of a thigh's turn is at the hip.
     model, data = figure.model, figure.model.createData()
     pin.computeJointJacobians(model, data, upright(figure))
@@ -280,11 +274,7 @@ def _centres(meeting: Mapping[str, list[int]], real: Array, axes: Array) -> dict
 
 
 def _is_person(joints: Mapping[str, int], places: Mapping[str, Array], walks: bool) -> bool:
-    """Whether shoulders stand above hips, by their places (3,), and no joint but a forearm's has two roles.
-
-    Those of a quadruped are beside each other, and its legs end at their knees. What `walks` may have legs alone, whose
-    hips stand above its ankles.
-    """
+    """Whether shoulders (3,) stand above hips, and no joint but a forearm's has two roles; of what `walks`, hips."""
     arms = "left_shoulder" in places
     if not {"left_hip", "left_ankle"} <= places.keys() or not (arms or walks):
         return False

@@ -67,8 +67,7 @@ class Piece(NamedTuple):
     reach: float  # metres from its origin to its farthest point
 
 
-Placed: TypeAlias = tuple[coal.CollisionGeometry, pin.SE3]
-"""A shape, and where it is in the world."""
+Placed: TypeAlias = tuple[coal.CollisionGeometry, pin.SE3]  # a shape, and where it is in the world
 
 
 def least_distance(first: Sequence[Placed], second: Sequence[Placed]) -> float:
@@ -99,10 +98,7 @@ class Things:
         }
 
     def scaled(self, name: str, scale: float) -> Array:
-        """Placements (n, 7) of a thing that moves, on a way of another scale.
-
-        Its lowest point is as many times as high above z = 0 as the scale says; below that it stays as it is.
-        """
+        """Placements (n, 7) of a moving thing on a scaled way; its lowest point's height above z = 0 is scaled too."""
         track = np.array(self.tracks[name])
         lowest = np.full(len(track), np.inf)
         for shape, local, _ in self._pieces[name]:
@@ -196,10 +192,7 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
 
 
 def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
-    """The height of the first surface of a scene's things below a place (3,), metres; None for none within 2 m.
-
-    A place in a thing, such as a wall, has none. Things that are moving are left out.
-    """
+    """Height [m] of the first still surface up to 2 m below a place (3,); None for none, or in a thing."""
     owners, geometry = scene.piece_owner, scene.geometry
     still = [
         (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
@@ -259,11 +252,8 @@ def own_rests(
     shares: Mapping[str, float],
     busy: Sequence[tuple[str, int, int]],
 ) -> list[ThingContact]:
-    """When hands of a skeleton touch their own body, by the roles of its `joints`, and from where.
-
-    `shares` are those of the hands, see `hand_shares`. The normals are in the world, in the middle frame of each; the
-    places are not said. Hands do not that are `busy`: roles with first frames and ends.
-    """
+    """When hands touch their own body, by roles of `joints` and `shares`, but where `busy` (role, first, end)."""
+    # normals are in the world, in the middle frame of each; the places are not said
     at = {role: motion.positions[:, motion.names.index(joint)] for role, joint in joints.items()}
     turns = {role: motion.rotations[:, motion.names.index(joint)] for role, joint in joints.items()}
     for part in ("hip", "shoulder"):
@@ -305,10 +295,7 @@ def _on_bone(places: Array, start: Array, end: Array) -> Array:
 def own_contacts(
     rests: Sequence[ThingContact], figure: Figure, roles: Roles, hands: Mapping[str, HeldPoint], free: Sequence[Array]
 ) -> list[ThingContact]:
-    """The same of a figure, in the axes of its joints: where its `hands` are in the middle of each, of the free fit.
-
-    `free` are its postures (nq,) in all frames.
-    """
+    """The same of a figure, in its joints' axes: where `hands` are in the middle of each, in postures `free` (nq,)."""
     model, data, pieces = figure.model, figure.model.createData(), dict[int, list[Piece]]()
     for piece in figure.geometry.geometryObjects:
         pieces.setdefault(piece.parentJoint, []).append(Piece(piece.geometry, piece.placement, np.inf))

@@ -184,8 +184,7 @@ def _surface(figure: Figure, segment: str, outward: Array, where: str) -> float:
     return max(found)
 
 
-NOTHING = "nothing"
-"""In place of equipment: nothing is worn."""
+NOTHING = "nothing"  # in place of equipment: nothing is worn
 
 CLOTH = (0.35, 0.38, 0.28, 1.0)
 

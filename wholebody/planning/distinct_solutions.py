@@ -148,10 +148,7 @@ def _method(time_limit: float | None, ends: float) -> QP:
 
 
 def _settled(problem: Problem, answer: Solution, time_limit: float | None, ends: float) -> Solution:
-    """The end of descents from an answer and from their ends in turn, until one stays where it begins.
-
-    Where neighbours of an answer meet the goals, a descent can end beside a maximum of the measures among them.
-    """
+    """The end of descents from an answer and from their ends in turn, until one stays where it begins."""
     for _ in range(SETTLING):
         after = next(_method(time_limit, ends).minima(problem, [answer.q]))
         if not after.solved or _difference(problem.scene.model, after.q, answer.q) < STAYED:
@@ -170,7 +167,6 @@ def _stand_alone(problem: Problem, postures: Iterable[Array]) -> bool:
 
 
 def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
-    """The start, and random postures (nq,)."""
     state, rng = problem.scene.state(problem.start), np.random.default_rng(seed)
     others = throughout(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
     return chain([problem.scene.figure.clamp(problem.start)], others)

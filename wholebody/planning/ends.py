@@ -20,8 +20,7 @@ ENDS = 8  # postures that meet goals; more = ends that are reached more easily, 
 ALONG = (0.0, 0.4, 0.7, 0.9)  # of a path: where nearer ends are looked for; more = shorter paths, for a solve each
 SHORTER = 0.98  # of the length to the end before: a motion to a nearer one is at most as long
 
-End = tuple[Array | None, str]
-"""A posture (nq,) at which a motion may end, None where goals were not met; and why."""
+End = tuple[Array | None, str]  # a posture (nq,) at which a motion may end, None where goals were not met; and why
 
 
 def answers(problem: Problem, sampler: Sampler) -> Iterator[End]:

@@ -49,12 +49,7 @@ class Seen(NamedTuple):
 
 
 class Geodesics:
-    """Geodesics of Pinocchio, for figures that hold nothing.
-
-    Attributes:
-        shares: (nv,) by which freedoms count in the distance of two postures, as far as they move a point.
-        partial: whether one joint may move in another way than before, and all others as they did.
-    """
+    """Geodesics of Pinocchio, for figures that hold nothing."""
 
     searches: ClassVar[int] = 12  # how many paths are looked for, of which the shortest counts; more = shorter, later
     samples: ClassVar[int] = 600  # of trees that look for a shorter path after the first; more = shorter paths, later
@@ -65,7 +60,7 @@ class Geodesics:
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
         self._clearance = problem.clearance
-        self.partial = True
+        self.partial = True  # whether one joint may move in another way than before, and all others as they did
         self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
@@ -92,6 +87,7 @@ class Geodesics:
         # as a piece sees another one that it does not carry, twice as much
         self._views = np.where(np.array(carried).reshape(-1, 2), 0.25, 0.5)
         levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        # shares: (nv,) by which freedoms count in the distance of two postures, as far as they move a point
         self.shares = levers / levers.max()
 
     def admit(self, q: Array) -> None:
@@ -139,10 +135,7 @@ class Geodesics:
         return list(path[1:])
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
-        """Postures (n, nq) near those of a path that keep constraints, and which of the motions between are blocked.
-
-        Those that it has no time for stay as they are and count as blocked.
-        """
+        """Postures (n, nq) near a path that keep constraints, and which motions between are blocked, or had no time."""
         blocked, seen = np.ones(len(path) - 1, dtype=bool), self._seen(path[0])
         for k, pair in enumerate(pairwise(path)):
             if BUDGET.over:
@@ -153,8 +146,7 @@ class Geodesics:
         return path, blocked
 
     def _parts(self, motion: Array) -> int:
-        # rad, m: length of a part of a motion
-        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))
+        return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))  # rad, m: length of a part of a motion
 
     def _seen(self, q: Array) -> Seen | None:
         """What is seen at a posture (nq,); None where a pair is nearer than is required, or a constraint is missed."""
@@ -195,11 +187,9 @@ class Geodesics:
 
 
 class TrackedMotions:
-    """Motions by steps of the QP tracker, for figures that keep constraints on the way.
+    """Motions by steps of the QP tracker, for figures that keep constraints on the way."""
 
-    Where nothing is held, a posture is the minimum of a measure, and steps are as long as distances allow. Else it is a
-    goal, and steps are short, as what is held is missed by the square of a step.
-    """
+    # postures are minima of a measure; where something is held goals, with short steps, which miss it by squares
 
     searches: ClassVar[int] = 2
     samples: ClassVar[int] = 12
@@ -252,10 +242,7 @@ class TrackedMotions:
         return self._approached(q, target, np.ones(self._model.nv), most)
 
     def pulled(self, q: Array, target: Array) -> list[Array]:
-        """Postures (nq,) of a motion from q that pulls free roots to their places in a target (nq,), without q.
-
-        All else gives way to what is around it, as a hand that is drawn out of a box does.
-        """
+        """Postures (nq,) from q, without it, that pull free roots to a target's places; all else gives way."""
         return self._approached(q, target, self._loose, np.inf)[0]
 
     def _approached(self, q: Array, target: Array, factors: Array, most: float) -> tuple[list[Array], bool]:
@@ -301,5 +288,4 @@ class TrackedMotions:
         return float(np.linalg.norm(factors * self.shares * pin.difference(self._model, q, target)))
 
 
-LocalPlanner: TypeAlias = Geodesics | TrackedMotions
-"""What makes the edges of trees."""
+LocalPlanner: TypeAlias = Geodesics | TrackedMotions  # what makes the edges of trees

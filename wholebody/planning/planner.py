@@ -260,11 +260,8 @@ class _Search:
         return None, "no motion was found within the time limit"
 
     def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
-        """A path from the start to an end by new trees, which stay empty where it is straight.
-
-        The trees grow towards at most so many samples, through which a path can be shorter than `most`, radians and
-        metres (as in anytime RRTs, Ferguson and Stentz 2006).
-        """
+        """A path from the start to an end by trees, grown towards so many samples, shorter than `most` [rad, m]."""
+        # samples through which no such path goes are left out (anytime RRTs, Ferguson and Stentz 2006)
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
         sliding = self._problem.scene.figure.roots and self._local is not self._slides
@@ -307,10 +304,7 @@ class _Search:
         return None, trees
 
     def _led(self, end: Array) -> list[Array]:
-        """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.
-
-        Most narrow places are around ends, and steps towards the start lead out of them.
-        """
+        """Postures from the start to an end (nq,) without trees, if any: straight, or from the end back."""
         start = self._problem.start
         way, self._straight = self._local.towards(start, end)
         if self._straight:

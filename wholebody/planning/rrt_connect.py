@@ -54,9 +54,6 @@ class RRTConnect:
     So branches towards samples go along things where no straight ones leave (as by retraction, Zhang and Manocha 2008):
     a root is pulled to its place in a sample, and all else gives way, which leads out of narrow places. Paths
     without steps are shorter.
-
-    Attributes:
-        samples: how many they were extended towards.
     """
 
     def __init__(
@@ -66,19 +63,15 @@ class RRTConnect:
         self._local, self._slides, self._every = local, slides, every
         self._trees = [Tree(model, start, local.shares), Tree(model, start, local.shares)]
         self._trees[0].add(start)
-        self.samples = 0
+        self.samples = 0  # how many they were extended towards
 
     def add_end(self, end: Array) -> None:
         """Add a posture (nq,) at which the motion may end."""
         self._trees[1].add(end)
 
     def grow(self, sample: Array) -> list[Array] | None:
-        """Extend the smaller tree towards a sample (nq,), and the other one towards what was reached.
-
-        A tree in a narrow place, from which most samples are out of reach, gets them all until it is out of there.
-
-        Returns postures from the start to an end if the trees meet.
-        """
+        """Extend the smaller tree to a sample (nq,), the other to what was reached; a path where they meet."""
+        # a tree in a narrow place, out of reach of most samples, has them all till it is out
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)
         there = 1 - here

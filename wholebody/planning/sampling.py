@@ -51,11 +51,8 @@ class Sampler:
         return self._drawn.pop()
 
     def near(self, q: Array, spread: float) -> Array:
-        """A posture (nq,) whose joints are a fraction of the path from q (nq,) to a random posture.
-
-        A free root is within `ROOM` of that of q. Where nothing is held it is a random share of that away, as narrow
-        places are small, and in half of the postures it turns, about the vertical or about any axis.
-        """
+        """A posture (nq,) whose joints are a fraction of the way from q to a random one; a free root within `ROOM`."""
+        # where nothing is held, a root is a random share of that away, and turns in half of the postures
         model, rng = self._figure.model, self._rng
         away = spread * np.asarray(pin.difference(model, q, self.turned(self.anywhere(), q)))
         for joint in self._roots:

@@ -30,11 +30,8 @@ def length(model: pin.Model, path: Sequence[Array]) -> float:
 def shortcut(
     model: pin.Model, path: list[Array], local: LocalPlanner, rng: np.random.Generator, partial: bool
 ) -> list[Array]:
-    """A shorter path: until several tries in a row fail, parts of it are replaced by motions of the local planner.
-
-    If `partial`, in every other try one degree of freedom, or a limb of a body, moves evenly from one end of a part to
-    the other, and the rest as before (partial shortcuts, Geraerts and Overmars 2007).
-    """
+    """A shorter path: parts are replaced by motions of the local planner until several tries in a row fail."""
+    # if `partial`, in every other try one freedom or limb goes straight alone (Geraerts and Overmars 2007)
     failed = 0
     while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
@@ -77,11 +74,8 @@ def _together(model: pin.Model, freedom: int, rng: np.random.Generator) -> list[
 
 
 def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: TrackedMotions) -> list[Array]:
-    """A path drawn tight round things as a band is: sweeps bring each posture to between its neighbours.
-
-    Steps of the tracker do so where things are in the way. Few shortcuts do as they go from one posture to another one,
-    and none through what touches on both sides (elastic bands, Quinlan and Khatib 1993; by successive overrelaxation).
-    """
+    """A path drawn tight round things, by sweeps that bring each posture to between its neighbours."""
+    # elastic bands, Quinlan and Khatib 1993, by successive overrelaxation with steps of the tracker
     band, before = _band(model, path, local), np.inf
     while len(band) > 2 and not BUDGET.over and (now := length(model, band)) < SWEPT * before:
         before = now
@@ -160,15 +154,11 @@ def _unwrapped(motions: Array) -> Array:
 
 
 def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
-    """A smooth path (n, nq) beside a free one: a Gaussian filters it, less so where that would not be free.
-
-    It is the free path where the time for it ends before.
-    """
+    """A path (n, nq) filtered by a Gaussian, less so where that is not free; the path itself where time ends before."""
     free = places(model, path)
     wide, share, found = _filtered(free, SPREAD * len(path)), np.ones(len(path)), path.copy()
     blocked, anew = np.zeros(len(path) - 1, dtype=bool), np.ones(len(path), dtype=bool)
-    # mixtures of the filtered path and the free one; more = smoother beside things, and later
-    for _ in range(8):
+    for _ in range(8):  # mixtures of the filtered path and the free one; more = smoother beside things, and later
         share[[0, -1]] = 0.0
         mixed = _postures(model, path, free + share[:, None] * (wide - free))
         for part in _runs(anew):

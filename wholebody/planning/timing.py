@@ -50,8 +50,7 @@ class Pace(Checked):
         """(nv,) largest velocities; a limit of the figure of 0 counts as none."""
         checks.instance(figure, Figure, "fastest: figure", "load one with wb.load('human')")
         own = np.array(figure.model.velocityLimit, dtype=float).reshape(-1)
-        # rad/s, m/s: of joints without a limit of their own
-        usual = 2.0 if self.velocity is None else self.velocity
+        usual = 2.0 if self.velocity is None else self.velocity  # rad/s, m/s: of joints without a limit of their own
         own = np.where((own > 0.0) & (own < UNLIMITED), own, usual)
         return own if self.velocity is None else np.minimum(own, self.velocity)
 
@@ -76,8 +75,7 @@ class Timing:
     def within(self) -> tuple[Array, Use]:
         """The frames of the fastest timing whose differences keep the limits, and how much of these they use."""
         slower = 1.0
-        # a motion whose derivatives keep the limits is slowed until its frames do
-        for _ in range(10):
+        for _ in range(10):  # a motion whose derivatives keep the limits is slowed until its frames do
             q = self.frames(slower)
             use = used(self._figure, q, self._pace)
             over = max(use.velocity, np.sqrt(use.acceleration))
@@ -103,10 +101,7 @@ def used(figure: Figure, q: Array, pace: Pace) -> Use:
 
 
 def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Array) -> Array:
-    """(m,) largest squares of the rate of s at each point, 0 at both ends, within velocities and accelerations (nv,).
-
-    `first` and `second` (m, nv) are the derivatives of the path with respect to s, whose points are 1 apart.
-    """
+    """(m,) largest squared rates within velocities and accelerations (nv,); `first`, `second` (m, nv)."""
     count = len(first)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         most = np.where(first != 0.0, velocity / np.abs(first), np.inf).min(axis=1, initial=np.inf) ** 2
@@ -132,8 +127,7 @@ def _bounds_of_u(first: Array, second: Array, acceleration: Array) -> tuple[Arra
 def _largest(first: Array, second: Array, acceleration: Array, following: float) -> float:
     """The largest b from which some u leads to at most a b of `following` at the next point."""
     high, slope = _bounds_of_u(first, second, acceleration)
-    # 0 <= b + 2 u <= following
-    low, slope = np.append(-high, 0.0), np.append(slope, -0.5)
+    low, slope = np.append(-high, 0.0), np.append(slope, -0.5)  # 0 <= b + 2 u <= following
     high = np.append(high, 0.5 * following)
     steeper = slope[:, None] - slope[None, :]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -20,8 +20,7 @@ from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoi
 from wholebody.scene.matter.body import Body
 from wholebody.scene.scene import Scene
 
-MOST_PRISMS = 10_000
-"""Convex pieces of a height field: making each takes half a millisecond."""
+MOST_PRISMS = 10_000  # convex pieces of a height field: making each takes half a millisecond
 
 
 def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Concavity = None) -> Scene:

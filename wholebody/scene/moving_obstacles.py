@@ -24,8 +24,7 @@ from wholebody.geometry.large_models import add_pairs
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.geometry_model import SceneGeometry
 
-PER_THING = 7
-"""Numbers of a thing in a configuration: where its centre is, and how it is turned, x, y, z, w."""
+PER_THING = 7  # numbers of a thing in a configuration: where its centre is, and how it is turned, x, y, z, w
 
 
 class MovingScene:

@@ -94,11 +94,7 @@ class Workspace(NotCopyable):
         return self.geometry.geometryObjects[index].placement * local.inverse()
 
     def next_frame(self, q: Array) -> FrameMotion | None:
-        """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
-
-        Things are where it ends. Those that were put into the figure are among them: it leaves them, or reports them.
-        The figure begins at the posture q (nq,).
-        """
+        """The frame of the things that moved since the last one, or are in the figure at q (nq,); None without any."""
         if not (self.moved or self._inside):
             return None
         still = [name for name, (before, after) in self.moved.items() if before == after]
@@ -160,10 +156,7 @@ class Workspace(NotCopyable):
         return self.proximity.query_views(self.state.update(q).data, within)
 
     def largest_approach(self, most: Array) -> Array:
-        """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
-
-        Things that are carried may be placed anew at any time; nothing is known of them.
-        """
+        """Most (pairs,) that distances can fall while freedoms move by at most `most` (nv,); inf of carried things."""
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in self.geometry.geometryObjects])
         for pieces in self._built.pieces_of.values():
             centres[[index for index, _ in pieces]] = np.inf

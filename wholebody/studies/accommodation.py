@@ -167,11 +167,8 @@ class Accommodation(Shown):
         return sum(held) / len(held) if held else math.nan
 
     def _exclusion(self, sex: str, verdict: str, out: list[int], rest: list[int]) -> Exclusion:
-        """The dimension that orders them best (Mann and Whitney 1947), and the bound that parts them (Youden 1950).
-
-        A bound alone is best by chance for a dimension that goes with the one that leaves people out. Where both ends
-        are left out, people are ordered by how far they are from the middle of those who are accommodated.
-        """
+        """The dimension that orders people best (Mann and Whitney 1947), and a bound that parts them (Youden 1950)."""
+        # where both ends are left out, people are ordered by how far from the middle of the others they are
 
         def apart(name: str) -> float:
             left, kept = (np.array([self.dimensions[k][name] for k in who]) for who in (out, rest))

@@ -142,10 +142,7 @@ def solve_many(
 def run_cases(
     order: Sequence[Case], warm_start: bool, running: Running, store: KeptRecords | None, *, lowers: bool = True
 ) -> Records:
-    """Solve cases; with `warm_start` those of a run begin one at the answer of the other. The store has earlier ones.
-
-    `lowers`: whether neighbours whose postures jump are solved again for a lower measure, see `neighbours.lower`.
-    """
+    """Solve cases, with `warm_start` from each other; `lowers`: those beside jumps again, see `lower`."""
     found = {} if store is None else {k: store.done(case.asked) for k, case in enumerate(order)}
     done = {k: replace(record, name=order[k].record.name, factors=order[k].record.factors)
             for k, record in found.items() if record is not None}  # fmt: skip

@@ -36,10 +36,7 @@ class Family(NamedTuple):
 
 
 def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingProxyType({})) -> bool:
-    """Try answers of solved cases as starts of neighbours until nothing new is solved; whether the caller ended it.
-
-    `linked` are cases that warm-started at the answer of another one, by number: that is not tried again.
-    """
+    """Try answers as starts of neighbours, but those `linked` already, until nothing new is solved; whether ended."""
     order, done, compute, keep = family[:4]
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
     for k, j in linked.items():

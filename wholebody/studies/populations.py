@@ -12,8 +12,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import AGE, PERCENTILE, Person, dimension_names, make_person
 from wholebody.figures.population import SEXES, population
 
-MOST = 10_000
-"""People of a sex at once."""
+MOST = 10_000  # people of a sex at once
 
 SEATED = ("sitting_height", "bideltoid_breadth", "hip_breadth_sitting", "buttock_knee_length", "popliteal_height")
 """Dimensions of `boundary` that are not left out: those of a seat."""

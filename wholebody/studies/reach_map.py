@@ -51,8 +51,7 @@ class Try(NamedTuple):
     reached: bool  # whether a posture was found
     inside: bool  # whether the place contradicts the constraints, so that it was not searched
     left: float  # distance to the nearest posture that was found, metres
-    # whether the search says that there is nothing nearer, so that places within that distance are left out
-    sure: bool
+    sure: bool  # whether the search says that there is nothing nearer, so that places within that distance are left out
     measure: float  # weighted sum of the measures at the posture
     q: Array  # (nq,) the posture
 
@@ -121,8 +120,7 @@ class _Grid(NamedTuple):
         """(places,) how many of the places beside each are marked."""
         padded = np.pad(marked.reshape([len(axis) for axis in self.axes]).astype(np.intp), 1)
         counts = [np.roll(padded, way, axis)[1:-1, 1:-1, 1:-1] for axis in range(3) for way in (1, -1)]
-        found: Indices = np.sum(counts, axis=0).ravel()
-        return found
+        return np.asarray(np.sum(counts, axis=0).ravel())
 
 
 def reach_map(

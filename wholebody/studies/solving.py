@@ -25,8 +25,7 @@ from wholebody.tasks.bounds import Freeze
 
 Make = Callable[[], Problem]
 
-Start = tuple[Make, Any]
-"""A problem, and the posture (nq,) from which it is solved, None for its own start."""
+Start = tuple[Make, Any]  # a problem, and the posture (nq,) from which it is solved, None for its own start
 
 SHIFTING = ("JointModelP", "JointModelTranslation")
 """How the names of Pinocchio's joints begin that shift: prismatic, planar and translation."""
@@ -200,8 +199,7 @@ def sent_to(function: Callable[..., Any], given: Sent, *others: Any) -> Any:
     return function(value, *others)
 
 
-_SEEN: OrderedDict[str, Scene] = OrderedDict()
-"""Scenes that were sent to this process, the newest last."""
+_SEEN: OrderedDict[str, Scene] = OrderedDict()  # scenes that were sent to this process, the newest last
 
 
 class _Reader(pickle.Unpickler):

@@ -130,7 +130,6 @@ class Value(Nameless):
 
 
 def _text(value: object, what: str) -> str:
-    """Any text that is not empty."""
     if not isinstance(value, str) or not value.strip():
         raise InputError(f"{what} is {shown(value)}; give a text, in quotes")
     return value

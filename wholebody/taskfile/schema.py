@@ -153,8 +153,7 @@ GOALS = {
     **CONTACTS,
 }
 
-SOFT = kind_of(tasks.Soft, "weight")
-"""What `soft` of a goal takes: the weight of the measure that the goal becomes."""
+SOFT = kind_of(tasks.Soft, "weight")  # what `soft` of a goal takes: the weight of the measure that the goal becomes
 
 FORCES = Several(Part("force", 'frame = "right_palm", force = [0.0, 0.0, -98.0]', {"": _form(tasks.Force)}), 0)
 STRENGTH = Part("strength", 'percentile = 50, sex = "male", age = 40', {"": _form(Strength)})

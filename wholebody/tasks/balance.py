@@ -197,8 +197,7 @@ class SolePolygon(NamedTuple):
     def _placed(self, state: State) -> Array:
         """The points (m, 3) in the world."""
         placed = state.joints[self.joints]
-        points: Array = np.einsum("nj,njk->nk", self.points, placed[:, :3]) + placed[:, 3]
-        return points
+        return np.asarray(np.einsum("nj,njk->nk", self.points, placed[:, :3]) + placed[:, 3])
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""

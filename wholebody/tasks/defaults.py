@@ -37,10 +37,7 @@ def usual_measures(
     scene: Scene, start: Array, terms: Sequence[Constraint | Goal], bounds: Sequence[Bound],
     stands: Sequence[str], *, ranges: bool,
 ) -> tuple[Measure, ...]:  # fmt: skip
-    """The measures of a problem that states none, for its resolved terms; the same ones of the same scene are known.
-
-    `stands` are the persons of `standing`.
-    """
+    """The measures of a problem that states none, for its resolved terms and persons of `standing`; once a scene."""
     if not scene.figure.ranges:  # no person; to look it up by its start takes longer
         return (_effort.resolve(scene, start),)
     feet, sits = stances(scene, start, terms), seated(scene, terms)
@@ -191,10 +188,7 @@ def usual_constraints(
     scene: Scene, start: Array, stated: Sequence[Constraint], stands: Sequence[str], *, ranges: bool,
     balance: bool | None,
 ) -> tuple[tuple[Constraint, ...], str]:  # fmt: skip
-    """The constraints that are added to resolved ones; the same ones of the same scene are known.
-
-    `stands` are the persons of `standing`, `ranges` and `balance` are as a problem takes them.
-    """
+    """The constraints added to resolved ones, once a scene; `ranges` and `balance` as a problem takes them."""
     if not (scene.figure.ranges or balance):
         return (), ""  # no person
     known = frozenset(map(type, stated))
@@ -212,12 +206,8 @@ def usual_constraints(
 def default_constraints(
     scene: Scene, start: Array, known: Set[type], *, ranges: bool, standing: Sequence[str], required: bool
 ) -> tuple[tuple[Constraint, ...], str]:
-    """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
-
-    `standing` are the figures that keep their balance, by what their names begin with. One who stands at the start on a
-    line, such as the tips of two toes, keeps no balance that is measured by an area. The default is left out there,
-    unless it is required.
-    """
+    """What is added to stated constraints, whose classes replace it; `standing`: names of figures that keep balance."""
+    # who stands on a line at the start keeps no balance that is measured by an area, unless it is required
     figure = scene.figure
     found: list[Constraint] = []
     if ranges and figure.ranges and RangeOfMotion not in known:

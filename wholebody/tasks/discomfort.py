@@ -98,7 +98,6 @@ class Discomfort(Measure):
 
 
 def _limited(figure: Figure) -> LimitedJoints:
-    """The joints of a figure that have two limits."""
     limits = figure.limits
     moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)
     idx_q, idx_v = limits.idx_q[moves], limits.idx_v[moves]

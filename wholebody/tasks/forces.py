@@ -19,8 +19,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance, Feet, Margin, SolePolygon, standing_corners
 from wholebody.tasks.base import ComputedTogether, filled
 
-GRAVITY = 9.81
-"""m/s^2, as in Pinocchio's models."""
+GRAVITY = 9.81  # m/s^2, as in Pinocchio's models
 
 MOST_FORCE = 1e5  # N: a greater force is a mistake of units
 
@@ -56,7 +55,6 @@ class Force(Checked):
 
 
 def _forces(value: object, where: str) -> tuple[Force, ...]:
-    """Forces as a tuple."""
     listed = checks.listed(value, where, "[wb.Force('right_palm', (0, 0, -100))]")
     return tuple(checks.instance(one, Force, where, "give wb.Force('right_palm', (0, 0, -100))") for one in listed)
 
@@ -92,10 +90,7 @@ def point_rows(state: State, point: Array, joint: int) -> Array:
 def pressure(
     state: State, loads: Loads, mass: range | None, height: float, rises: Array | float = 0.0
 ) -> tuple[Array, Array]:
-    """The point (2,) about which weight and forces have no moment but a vertical one, and its derivative.
-
-    It is at a height [m], whose derivative (nv,) is `rises`.
-    """
+    """The point (2,) of no moment but a vertical one, at a height [m] that `rises` (nv,), and its derivative."""
     model = state.model
     weight = GRAVITY * sum(model.inertias[k].mass for k in (mass or range(1, model.njoints)))
     center, moved = state.center_of_mass(mass)[:2], state.center_of_mass_jacobian(mass)[:2]

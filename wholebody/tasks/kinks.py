@@ -74,8 +74,7 @@ def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) 
             met = between_pieces(first.shapes[i], a, second.shapes[j], slid)
             found.append((-np.array(met.normal), np.array(met.getNearestPoint1())))
     crossed = np.array(found)
-    sound: Array = crossed[np.linalg.norm(crossed[:, 0], axis=1) > 0.5]
-    return sound
+    return np.asarray(crossed[np.linalg.norm(crossed[:, 0], axis=1) > 0.5])
 
 
 def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: float = 0.0) -> Array:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array, cross
 from wholebody.base.checks import known
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names
+from wholebody.figures.description import JointCone
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange, TwistRange
 from wholebody.figures.state import State
 from wholebody.scene.scene import Scene
@@ -144,6 +145,7 @@ class TwistRow(NamedTuple):
 
 
 Row: TypeAlias = ConeRow | CoupledRow | EllipticRow | TwistRow
+_T = TypeVar("_T", bound="RangeConstraint")
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +153,20 @@ class RangeConstraint(Constraint):
     """A row for each of some cones or ranges: the angle to its end, positive inside [rad]."""
 
     angular = np.ones((), dtype=bool)  # of all rows
+    of: ClassVar[str]  # the attribute of figures that has the cones or ranges
+    word: ClassVar[str]  # what one of these is called
+    names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
     rows: tuple[Row, ...] = field(init=False, repr=False)  # each cone or range with its frames and joints
     row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
+
+    def resolve(self: _T, scene: Scene, start: Array) -> _T:
+        """Find the cones or ranges, their frames and joints."""
+        parts: Mapping[str, JointCone | MotionRange] = getattr(scene.figure, self.of)
+        if not parts:
+            raise InputError(f"{type(self).__name__}: this figure has no {self.word}s; leave the constraint out")
+        names = tuple(parts) if self.names is None else tuple(self.names)
+        found = [_row(parts[known(name, parts, self.word, type(self).__name__)], scene, name) for name in names]
+        return filled(self, rows=tuple(found), row_names=names)
 
     def value(self, state: State) -> Array:
         """(m,) angle to the end of each range, positive inside [rad]."""
@@ -185,20 +199,7 @@ class ReachCones(RangeConstraint):
         >>> shoulder = wb.tasks.ReachCones(["left_shoulder"])
     """
 
-    names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
-
-    def resolve(self, scene: Scene, start: Array) -> ReachCones:
-        """Find the cones and their frames."""
-        cones, rows = scene.figure.cones, list[Row]()
-        if not cones:
-            raise InputError("ReachCones: this figure has no reach cones; leave the constraint out")
-        names = tuple(cones) if self.names is None else tuple(self.names)
-        for name in names:
-            cone = cones[known(name, cones, "reach cone", "ReachCones")]
-            reference = inputs.find_place(scene, cone.reference, "ReachCones")
-            limb = inputs.find_place(scene, cone.limb, "ReachCones")
-            rows.append(ConeRow(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))
-        return filled(self, rows=tuple(rows), row_names=names)
+    of, word = "cones", "reach cone"
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,16 +223,7 @@ class RangeOfMotion(RangeConstraint):
         >>> neck = wb.tasks.RangeOfMotion(["neck"])
     """
 
-    names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
-
-    def resolve(self, scene: Scene, start: Array) -> RangeOfMotion:
-        """Find the ranges, their frames and joints."""
-        ranges = scene.figure.ranges
-        if not ranges:
-            raise InputError("RangeOfMotion: this figure has no ranges of motion; leave the constraint out")
-        names = tuple(ranges) if self.names is None else tuple(self.names)
-        rows = [_row(ranges[known(name, ranges, "range of motion", "RangeOfMotion")], scene) for name in names]
-        return filled(self, rows=tuple(rows), row_names=names)
+    of, word = "ranges", "motion range"
 
 
 def _between(coordinates: tuple[Coordinate, ...], least: Array, most: Array) -> tuple[float, float]:
@@ -240,7 +232,10 @@ def _between(coordinates: tuple[Coordinate, ...], least: Array, most: Array) -> 
     return low, sum(max(factor * float(least[q]), factor * float(most[q])) for q, _, factor in coordinates)
 
 
-def _row(part: MotionRange, scene: Scene) -> Row:
+def _row(part: JointCone | MotionRange, scene: Scene, name: str) -> Row:
+    if isinstance(part, JointCone):
+        reference, limb = (inputs.find_place(scene, frame, "ReachCones") for frame in (part.reference, part.limb))
+        return ConeRow(part.cone, reference, limb, inputs.direction(part.axis, f"ReachCones: axis of {name}"))
     if isinstance(part, CoupledRange):
         return CoupledRow(tuple(_coordinate(scene, joint, factor) for joint, factor in part.joints.items()), part.bound)
     if isinstance(part, EllipticRange):

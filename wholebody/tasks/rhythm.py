@@ -218,8 +218,7 @@ def _bent(q: Sequence[float], lumbar: Lumbar) -> tuple[float, tuple[float, ...]]
     """Flexion of the lumbar spine beyond its share [rad], its slopes by its joints and turns of the root about y, z."""
     x, y, z, w = q[lumbar.root[0] + 3 : lumbar.root[0] + 7]
     forward, left, up = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
-    # The root's x axis dips by sin(tilt) = -forward, the height of that axis.
-    share = math.tanh(-LUMBAR_RATE * forward)
+    share = math.tanh(-LUMBAR_RATE * forward)  # the root's x axis dips by sin(tilt) = -forward, the height of that axis
     steep = lumbar.most * LUMBAR_RATE * (1.0 - share * share)
     flexion = sum([q[place] for place in lumbar.idx_q])
     return flexion - lumbar.most * share - lumbar.rest, (1.0, 1.0, 1.0, -steep * up, steep * left)

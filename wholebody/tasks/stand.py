@@ -200,8 +200,7 @@ def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[lis
     return [point for point, _ in pairs], [joint for _, joint in pairs]
 
 
-HANGS = 6.0
-"""1/rad^2, beside an effort of 0.7 that counts from the trunk: ESTIMATE."""
+HANGS = 6.0  # 1/rad^2, beside an effort of 0.7 that counts from the trunk: ESTIMATE
 
 
 BELOW = np.array((1.0, 1.0, -1.0))  # x, y and down by x, y and z

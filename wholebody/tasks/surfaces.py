@@ -145,10 +145,7 @@ def once_by(
     scene: Scene, things: Iterable[str], where: str, start: Array, key: Hashable,
     make: Callable[[State, State], _T],
 ) -> _T:  # fmt: skip
-    """What `make` makes of the start (nq,) and the neutral posture; once, where the figure carries none of some things.
-
-    Then they stand the same at every start.
-    """
+    """What `make` makes of the start (nq,) and the neutral posture; once, if the figure carries none of them."""
 
     def made() -> _T:
         with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:

@@ -146,11 +146,8 @@ def _outwards(scene: Scene, point: Surface) -> Array | None:
 
 
 def on_its_side(term: Any, scene: Scene, state: State, distance: float) -> Any:
-    """A resolved `Touch` whose point is to be in front of the thing by a distance [m]; a term of another kind stays.
-
-    The distance of a point does not tell the side: a sole that comes from below would end under a rung. What is asked
-    for instead is that a point in front of it touches the thing, farther out than that is thick.
-    """
+    """A resolved `Touch` with its point in front of the thing by a distance [m]; a term of another kind stays."""
+    # a point's distance does not tell the side: a point farther out than the thing is thick is asked for instead
     part = term.parts[0] if isinstance(term, Touch) else None
     if not isinstance(part, Gap) or part.first.fixed is None or abs(part.rows(state)[0][0]) <= distance:
         return term

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,11 @@ from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 from wholebody.terms.entries import Integers
 from wholebody.terms.residual_kernel import SMALL, equidistant, inverse_left, rotation_vector
+
+Table: TypeAlias = tuple[Array, Integers]  # numbers and places of the terms of one kind, a row each
+
+Carried: TypeAlias = tuple[Array, Integers, NDArray[np.int8]]
+"""Columns of the joint Jacobian (n, 6), the degree of freedom of each, and which of them move a joint (njoints, n)."""
 
 
 @compiled(inner=True)
@@ -131,16 +138,9 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
 
 
 @compiled(inner=True)
-def rhythms(
-    elevations: Array,
-    elevation_places: Integers,
-    lumbars: Array,
-    lumbar_places: Integers,
-    q: Array,
-    measure: Array,
-    squares: Array,
-) -> None:
+def rhythms(of_limbs: Table, of_lumbar: Table, q: Array, measure: Array, squares: Array) -> None:
     """See `tasks.Rhythm`; `squares` is as for `kernel.linearise`."""
+    (elevations, elevation_places), (lumbars, lumbar_places) = of_limbs, of_lumbar
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
     for e in range(len(elevations)):
         flexion, abduction = q[elevation_places[e, 1]], q[elevation_places[e, 2]]
@@ -243,16 +243,9 @@ def _rotation(unit: Array, turn: Array) -> None:
 
 
 @compiled(inner=True)
-def heights(
-    tables: Array,
-    entries: Integers,
-    joints: Array,
-    columns: Array,
-    support: NDArray[np.int8],
-    column: Integers,
-    measure: Array,
-) -> None:
+def heights(tables: Array, entries: Integers, joints: Array, tree: Carried, measure: Array) -> None:
     """See `tasks.PotentialEnergy`."""
+    columns, column, support = tree
     nv = measure.shape[1] - 1
     row = np.empty(nv)
     centre = np.empty(3)
@@ -274,15 +267,8 @@ def heights(
 
 
 @compiled(inner=True)
-def hangs(
-    table: tuple[Array, Integers],
-    joints: Array,
-    tree: tuple[Array, Integers, NDArray[np.int8]],
-    measure: Array,
-    squares: Array,
-    first: int,
-) -> None:
-    """See `tasks.Hang`; `tree` is columns of the joint Jacobian, their places, and which of them move a joint."""
+def hangs(table: Table, joints: Array, tree: Carried, measure: Array, squares: Array, first: int) -> None:
+    """See `tasks.Hang`."""
     tables, entries = table
     columns, column, support = tree
     nv = measure.shape[1] - 1

@@ -124,7 +124,6 @@ def _inside(scene: Scene, q: Array) -> Array:
 
 
 def _value(term: Any, state: State) -> Array:
-    """Values (m,) of a term."""
     return np.atleast_1d(np.asarray(term.error(state) if isinstance(term, Goal) else term.value(state), dtype=float))
 
 

@@ -46,17 +46,13 @@ of them for each angle of an ellipse; TWIST: joint, joint of the reference.
 """
 
 Integers: TypeAlias = NDArray[np.int64]
-Row: TypeAlias = tuple[tuple[int, ...], Array]
-"""Integers and floats of a row of a table."""
+Row: TypeAlias = tuple[tuple[int, ...], Array]  # integers and floats of a row of a table
 
 _NO_EDGES: Array = np.zeros((0, 15))
 
 
 class Entry(NamedTuple):
-    """One row of a table of goals or constraints: which table, its integers without the first, and its floats.
-
-    It makes `rows` rows of the Jacobian. `edges` (k, 15) are planes of the edges of a reach cone: `ReachCone.planes`.
-    """
+    """A row of a table of terms: its table, integers and floats, `rows` of the Jacobian, `edges` (k, 15) of a cone."""
 
     table: int
     integers: tuple[int, ...]

@@ -14,6 +14,7 @@ from wholebody.geometry.proximity_kernel import gather
 from wholebody.tasks.discomfort import POWER, STEEPNESS
 from wholebody.terms import entries as kinds
 from wholebody.terms.coordinate_kernel import (
+    Table,
     balls,
     coordinates,
     coupled_ranges,
@@ -51,7 +52,7 @@ def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
 
 
 @compiled(inner=True)
-def _table(plan: Plan, table: int) -> tuple[Array, Integers]:
+def _table(plan: Plan, table: int) -> Table:
     floats, integers, layout, _ = plan
     return _floats(floats, layout, table), _integers(integers, layout, table)
 
@@ -182,7 +183,7 @@ def _measures(plan: Plan, joints: Array, tree: Tree, q: Array, measure: Array, s
     if layout[kinds.ROOT_DISTANCE, 1]:
         root_distances(*_table(plan, kinds.ROOT_DISTANCE), q, measure)
     if layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]:
-        rhythms(*_table(plan, kinds.ELEVATION), *_table(plan, kinds.LUMBAR), q, measure, squares)
+        rhythms(_table(plan, kinds.ELEVATION), _table(plan, kinds.LUMBAR), q, measure, squares)
     first = layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]
     if layout[kinds.BALL, 1]:
         balls(*_table(plan, kinds.BALL), q, measure, squares, first)
@@ -190,7 +191,7 @@ def _measures(plan: Plan, joints: Array, tree: Tree, q: Array, measure: Array, s
         first += 3 * layout[kinds.BALL, 1]
         hangs(_table(plan, kinds.HANG), joints, (columns, column, support), measure, squares, first)
     if layout[kinds.HEIGHT, 1]:
-        heights(*_table(plan, kinds.HEIGHT), joints, columns, support, column, measure)
+        heights(*_table(plan, kinds.HEIGHT), joints, (columns, column, support), measure)
 
 
 @compiled(error_model="numpy")
@@ -246,14 +247,7 @@ def _moments(bodies: Array, joints: Array, parents: Integers) -> Array:
 
 
 @compiled(inner=True, error_model="numpy")
-def _mass_centers(
-    table: tuple[Array, Integers],
-    bodies: Array,
-    joints: Array,
-    tree: Tree,
-    value: Array,
-    jacobian: Array,
-) -> None:
+def _mass_centers(table: Table, bodies: Array, joints: Array, tree: Tree, value: Array, jacobian: Array) -> None:
     """Rows of the centre of mass of one figure or all: each column needs its subtree's moment."""
     tables, entries = table
     columns, column, parents = tree
@@ -299,8 +293,7 @@ def _box(limits: Array, places: Integers, boxes: Array, q: Array, box: Array) ->
         box[0, places[e, 1]] = low * limits[e, 2] if low < 0.0 else low
         box[1, places[e, 1]] = high * limits[e, 2] if high > 0.0 else high
     for e in range(0, len(boxes), 2):
-        # a joint out of its limits comes back no faster than the bound lets it
-        for v in range(box.shape[1]):
+        for v in range(box.shape[1]):  # a joint out of its limits comes back no faster than the bound lets it
             low, high = boxes[e, v], boxes[e + 1, v]
             box[0, v] = min(max(box[0, v], low), high)
             box[1, v] = min(max(box[1, v], low), high)

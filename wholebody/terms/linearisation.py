@@ -223,10 +223,7 @@ class Lineariser:
     def _pass(
         self, q: Array, within: float, room: tuple[Array, Array, Array, Array]
     ) -> tuple[Contacts, int, list[tuple[float, Expansion]]]:
-        """Contacts at a posture, how many rows, and other measures with their weights; `room` takes values.
-
-        Contacts and rows are overwritten by the next call.
-        """
+        """Contacts and rows at a posture, until the next call, and other measures with weights; `room` takes values."""
         state, plan, near, within = self.state.update(q), self._plan, self.workspace.proximity, within + self._largest
         index, placed = near.ask(state.data, within, self._clearances[1])
         if len(index) > self._near.size:

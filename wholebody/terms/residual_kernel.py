@@ -12,8 +12,7 @@ from wholebody.tasks.axis import NO_ANGLE, STEEPEST, TOUCHING
 from wholebody.tasks.range_of_motion import OPPOSITE
 from wholebody.terms.entries import Integers
 
-SMALL = 1e-4
-"""Angle [rad] below which the series of log and its derivative are exact to rounding."""
+SMALL = 1e-4  # angle [rad] below which the series of log and its derivative are exact to rounding
 
 
 @compiled(inner=True)
@@ -232,8 +231,7 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
         value[row] = signed_angle(edges[entries[e, 4] : entries[e, 4] + entries[e, 3]], local, outward)
         for i in range(3):
             local[i] = turn[i, 0] * outward[0] + turn[i, 1] * outward[1] + turn[i, 2] * outward[2]
-        # the direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g)
-        for i in range(3):
+        for i in range(3):  # the direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g)
             j, k = (i + 1) % 3, (i + 2) % 3
             wrench[row, 3 + i] = world[j] * local[k] - world[k] * local[j]
 

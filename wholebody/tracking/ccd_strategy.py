@@ -51,11 +51,7 @@ class CCDStrategy:
 
 
 class RigidTranslation:
-    """Follows tracked postures of a figure with a free root that is displaced as a rigid body.
-
-    The fingers follow the glove, and the hand with its present fingers is translated by PD_g (Schmidl and Lin, equation
-    1), computed again until nothing overlaps. Raises InputError for a figure that is fixed to the world.
-    """
+    """Tracked postures with a free root translated as a rigid body by PD_g (Schmidl and Lin, equation 1) until free."""
 
     sweep_tolerance = 2e-4
 

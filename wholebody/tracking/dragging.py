@@ -93,8 +93,7 @@ class DragJudgement:
 def present_position(problem: Problem, goal: int = 0) -> Array:
     """Position (3,), metres, of the frame or point of a goal at the start; raises InputError for other goals."""
     term = moving_goal(problem, goal)
-    here: Array = target_position(problem, goal) + term.error(problem.scene.state(problem.start))[:3]
-    return here
+    return np.asarray(target_position(problem, goal) + term.error(problem.scene.state(problem.start))[:3])
 
 
 def target_position(problem: Problem, goal: int = 0) -> Array:

@@ -222,7 +222,6 @@ class LiveDrag:
         return float(np.linalg.norm(self.place_at(q, self.taken) - target))
 
     def _remember(self) -> None:
-        """Note what `undo` goes back to."""
         self._undo.append(self._subject.remembered(self.q))
         del self._undo[:-100]  # postures that are remembered
 
@@ -278,13 +277,11 @@ class LiveDrag:
             return frame
         self._subject.restore(before)
         self._stopped = f"{self.taken} stays: {met[0]}"
-        # m: a thing tries to move at least so far
-        self._reach = max(0.5 * self._reach, 0.002)
+        self._reach = max(0.5 * self._reach, 0.002)  # m: a thing tries to move at least so far
         return None
 
     def _contacts(self, q: Array) -> Contacts:
-        # m: pairs nearer than this are counted as contacts
-        return self.scene.contacts(q, within=0.002)
+        return self.scene.contacts(q, within=0.002)  # m: pairs nearer than this are counted as contacts
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
         contacts = self._contacts(self.q)

@@ -145,8 +145,7 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
     first = down - (down @ axis) * axis
     first /= np.linalg.norm(first)
     angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]  # a polygon of 72 sides
-    corners: Array = middle + radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
-    return corners
+    return np.asarray(middle + radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first)))
 
 
 def read_path(path: str | os.PathLike[str]) -> Array:

@@ -27,10 +27,7 @@ CLEARANCE = 1e-3
 
 
 class Attraction(DistanceMeasure):
-    """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
-
-    Without contact one program reaches its minimum. A goal would be met at any cost in the other joints.
-    """
+    """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there."""
 
     def __init__(self, q: Array, weights: Array) -> None:
         """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""
@@ -70,11 +67,9 @@ class FrameMotionLimit(Bound):
 
 
 class QPStrategy:
-    """Follows tracked postures by a tracker of `QP`, in frames of `dt` seconds, from an overlap-free start (nq,).
+    """Follows tracked postures by a tracker of `QP`, `dt` [s], from a free start (nq,); `rigid` figures as a whole."""
 
-    A `rigid` figure is displaced as a whole while its joints follow the tracker. It may touch the things in `touching`;
-    from all others it keeps `CLEARANCE`.
-    """
+    # things in `touching` may be touched; from all others the figure keeps `CLEARANCE`
 
     sweep_tolerance = 5e-5
 

@@ -156,17 +156,11 @@ def _hand_at(figure: Figure, glove: str, at: Sequence[float], turn: float = 0.0,
 def script(
     figure: Figure, keys: Sequence[tuple[float, Array]], *, dt: float = FRAME, seed: int = 0, name: str = "script"
 ) -> Clip:
-    """Move through postures, at rest in each.
+    """Move through postures, at rest in each; two equal keys make a pause.
 
     Between two keys the share of the motion is ``10 s^3 - 15 s^4 + 6 s^5``, the straight movement of least jerk (Flash
-    and Hogan 1985, "The Coordination of Arm Movements", J. Neuroscience 5(7)). Two equal keys make a pause.
-
-    Args:
-        figure: the figure that moves.
-        keys: seconds from the key before (the first one's are not used), and the posture (nq,).
-        dt: seconds from frame to frame.
-        seed: of the tremor.
-        name: name of the track in messages.
+    and Hogan 1985, "The Coordination of Arm Movements", J. Neuroscience 5(7)). `keys`: seconds from the key before (the
+    first one's are not used), and the posture (nq,).
     """
     frames = [keys[0][1]]
     for (_, before), (seconds, after) in pairwise(keys):
@@ -199,8 +193,7 @@ def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) ->
 
 FILE = SceneFile(Path(__file__).with_name("scenes.toml"))
 
-SCENES = FILE.scenes
-"""Descriptions of the scenes, by name; each lasts 600 frames or more."""
+SCENES = FILE.scenes  # descriptions of the scenes, by name; each lasts 600 frames or more
 
 build_scene = FILE.build
 

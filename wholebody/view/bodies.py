@@ -32,19 +32,14 @@ class Skinned(NamedTuple):
 
 
 class Skin:
-    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body.
-
-    Attributes:
-        surface: of the figure.
-        places: of each bone the joint that carries it, and its placement (4, 4) there.
-        joints: names of the joints that carry bones.
-    """
+    """A figure's surface, whose bones are found among the figure's joints; some figures lack segments of the body."""
 
     def __init__(self, surface: Surface, figure: Any, at: Array) -> None:
         """Find the bones of a figure; `at` (4, 4) is where its world is."""
-        self.surface = surface
+        self.surface = surface  # of the figure
+        # places: of each bone the joint that carries it, and its placement (4, 4) there
         self.places = surface.attached(figure, at)
-        self.joints = tuple(dict.fromkeys(name for name, _ in self.places))
+        self.joints = tuple(dict.fromkeys(name for name, _ in self.places))  # names of the joints that carry bones
 
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the surface at a node, moved by the nodes of its joints; in a colour, or each patch in its own."""
@@ -138,10 +133,7 @@ class DrawnFigure(NamedTuple):
 
 
 class Bodies:
-    """All pieces of a scene in the scene graph, in the order of its geometry model.
-
-    `see_through` names things to draw transparent; `pieces` draws a figure's pieces even if it has a surface.
-    """
+    """The pieces of a scene in the scene graph, in order; some `see_through`, a figure's own with `pieces`."""
 
     def __init__(self, scene: ViewedScene, see_through: Collection[str], pieces: bool) -> None:
         self.scene = scene

@@ -29,6 +29,9 @@ _FLAGS = (
 _READY = "window.wholebody !== undefined && window.wholebody.ready"
 
 
+TIMEOUT = 60.0  # s: longest wait for any answer
+
+
 class BrowserError(WholebodyError):
     """The headless browser failed to carry out a command."""
 
@@ -53,17 +56,10 @@ class Browser:
         requests: addresses that the page requested since it was opened.
     """
 
-    def __init__(self, size: tuple[int, int] = (960, 720), timeout: float = 60.0, page: str = "") -> None:
-        """Start Chromium.
+    def __init__(self, size: tuple[int, int] = (960, 720), page: str = "") -> None:
+        """Start Chromium with a page of a width and height, pixels, that opens the HTML of a `Viewer`; "" for none.
 
-        Args:
-            size: width and height of the page, pixels.
-            timeout: longest wait for any answer, seconds.
-            page: HTML of the page of a `Viewer` that it opens, as a file without network; "" for none.
-
-        Raises:
-            MissingPackageError: there is no Chromium.
-            BrowserError: it cannot be started.
+        MissingPackageError without Chromium, BrowserError where it cannot be started.
         """
         executable = find_chromium()
         if executable is None:
@@ -71,7 +67,6 @@ class Browser:
                 "pictures and movies need Chromium, and none was found; run: apt-get install chromium-headless-shell "
                 "(or name one in WHOLEBODY_CHROMIUM); save() writes HTML without a browser"
             )
-        self.timeout = timeout
         self.errors: list[str] = []
         self.requests: list[str] = []
         self._size, self._opens = size, bool(page)
@@ -110,13 +105,13 @@ class Browser:
     def _attach(self) -> None:
         """Wait for the page that Chromium opened when it started, and listen to it."""
         pages: list[Any] = []
-        end = time.monotonic() + self.timeout
+        end = time.monotonic() + TIMEOUT
         while not pages and time.monotonic() < end:
             found = self._ask("Target.getTargets", None)["targetInfos"]
             pages = [target["targetId"] for target in found if target["type"] == "page"]
             time.sleep(0.0 if pages else 0.01)
         if not pages:
-            raise BrowserError(f"the browser opened no page within {self.timeout:g} s")
+            raise BrowserError(f"the browser opened no page within {TIMEOUT:g} s")
         self._session = self._ask("Target.attachToTarget", None, targetId=pages[0], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Network"):
             self._call(f"{domain}.enable")
@@ -138,7 +133,7 @@ class Browser:
         self._loaded = False
         if error := self._call("Page.navigate", url=url).get("errorText"):
             raise BrowserError(f"the browser could not open {url}: {error}")
-        end = time.monotonic() + self.timeout
+        end = time.monotonic() + TIMEOUT
         while not self._loaded:
             self._receive(end)
         self.until(ready)
@@ -154,12 +149,12 @@ class Browser:
 
     def until(self, condition: str) -> None:
         """Wait until a JavaScript expression is true; raises BrowserError for a page that has an error or is slow."""
-        end = time.monotonic() + self.timeout
+        end = time.monotonic() + TIMEOUT
         while not self.evaluate(condition):
             if self.errors:
                 raise BrowserError(f"the page failed: {self.errors[0]}")
             if time.monotonic() > end:
-                raise BrowserError(f"the page did not reach `{condition}` within {self.timeout:g} s")
+                raise BrowserError(f"the page did not reach `{condition}` within {TIMEOUT:g} s")
             time.sleep(0.02)
 
     def evaluate(self, expression: str) -> Any:
@@ -222,7 +217,6 @@ class Browser:
     # ---- the protocol: JSON messages, each ended by a zero byte
 
     def _call(self, method: str, **params: Any) -> dict[str, Any]:
-        """The page's answer."""
         if self._session is None:
             self._attach()
         return self._ask(method, self._session, **params)
@@ -245,8 +239,7 @@ class Browser:
         return self._number
 
     def _answer(self, method: str, number: int) -> dict[str, Any]:
-        """Wait for the answer to a message."""
-        end = time.monotonic() + self.timeout
+        end = time.monotonic() + TIMEOUT
         while number not in self._answers:
             self._receive(end)
         answer = self._answers.pop(number)
@@ -263,9 +256,8 @@ class Browser:
         )
 
     def _receive(self, end: float) -> None:
-        """Read the next messages of the browser."""
         if not select.select([self._in], [], [], max(end - time.monotonic(), 0.0))[0]:
-            raise BrowserError(f"the browser did not answer within {self.timeout:g} s")
+            raise BrowserError(f"the browser did not answer within {TIMEOUT:g} s")
         chunk = os.read(self._in, 1 << 20)
         if not chunk:
             raise self._gone()

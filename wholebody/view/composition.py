@@ -185,10 +185,7 @@ def panel(title: str, keyframes: Sequence[Keyframe], count: int, dt: float, foun
 
 
 class Timed(NamedTuple):
-    """Postures (nq,) at ascending times (n,), seconds; of each the frame that it is in, and its share of the frame.
-
-    Where things moved, a frame has an inner path: a figure does not go straight.
-    """
+    """Postures (nq,) at ascending times (n,) [s], and their frames and shares; where things move, the path bends."""
 
     q: list[Array]
     times: Array

@@ -265,10 +265,7 @@ def _mesh(
     shadow: bool = True,
     scales: tuple[bool, ...] = (),
 ) -> Three:
-    """A three.js mesh. The name is its uuid: animations tell objects apart by it, and files come out the same.
-
-    `scales` says of a marker along which of its axes the page makes it larger in a picture of more.
-    """
+    """A three.js mesh, whose name is its uuid; `scales`: axes along which the page makes a marker larger."""
     made: Three = {
         "uuid": name,
         "type": "Mesh",

@@ -210,7 +210,6 @@ class LivePage:
             gui.add_button(f"save as {self._save_to.name}").on_click(self._locked(self._write))
 
     def _add_rings(self, drag: LiveDrag) -> None:
-        """Rings that turn the chosen handle of a frame."""
         self._rings = self.server.scene.add_transform_controls("/turn", 0.2, disable_axes=True, disable_sliders=True)
 
         async def turned(event: Any) -> None:
@@ -365,8 +364,7 @@ class LivePage:
                 place = at[owner] * scene.objects[owner].placement.actInv(place)
             values[number] = pin.SE3ToXYZQUAT(place)
         with self.server.atomic():
-            # each costs viser more than the physics of a piece
-            moved = ~(np.abs(values - self._sent) <= STILL)
+            moved = ~(np.abs(values - self._sent) <= STILL)  # each costs viser more than the physics of a piece
             for number in np.flatnonzero(moved[:, :3].any(axis=1)).tolist():
                 self._pieces[number].position = self._sent[number, :3] = values[number, :3]
             for number in np.flatnonzero(moved[:, 3:].any(axis=1)).tolist():
@@ -375,7 +373,6 @@ class LivePage:
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:
-    """Red, green, blue of the handle of a frame."""
     return (225, 90, 40) if held else (70, 130, 220)
 
 

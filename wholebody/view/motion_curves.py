@@ -42,14 +42,8 @@ def motion_curves(
 ) -> str:
     """HTML of curves and a film of motions, which makes no network requests.
 
-    Args:
-        motion: the recorded skeleton; None where there is none.
-        clips: name to a clip, such as "retargeted" and "freed", of as many frames as the skeleton.
-        scene: what the figures carry, and what stands around.
-        names: as for `wb.retarget`.
-
-    Raises:
-        InputError: motions of other numbers of frames.
+    `motion` is the recorded skeleton, if any; `clips` have as many frames, or an InputError; `scene` is what they
+    carry, and what stands around; `names` as for `wb.retarget`.
     """
     first = next(iter(clips.values()))
     with Scratch() as folder, beside(motion, clips, scene, first.name) as viewer:

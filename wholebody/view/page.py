@@ -36,11 +36,7 @@ _carriers: dict[str, tuple[str, str]] = {}
 
 
 def notebook_frame(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a frame with the page of a scene, for the output of a notebook's cell.
-
-    The first cell that shows a scene has the player, whenever it is run; the frames of the others take it from there.
-    They do so with large, equal parts, such as a person's skin.
-    """
+    """HTML of a frame with a scene's page for a notebook's cell; the first cell has the player, and equal parts."""
     cell = _cell()
     for name, carrier in [*_carriers.items()]:
         if cell is not None and carrier[0] == cell[0] and carrier != cell:  # what an earlier run of this cell had

@@ -74,10 +74,7 @@ class Screenshots:
             self._started()
 
     def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> Callable[[], bytes]:
-        """Begin to draw commands in an empty page of this width and height, with the panel if wanted.
-
-        The function that is returned waits for the PNG, and comes before the next picture.
-        """
+        """Begin to draw commands in an empty page, with the panel if wanted; what is returned waits for the PNG."""
         return self._draw(wanted, size).capturing(legend=legend)
 
     def pictures(self, wanted: Sequence[Command], size: Any, times: Iterable[float]) -> Iterator[bytes]:

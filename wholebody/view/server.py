@@ -31,10 +31,7 @@ class Op:
 
 
 class Command(NamedTuple):
-    """One message to the page: its kind, node and key, and its bytes (msgpack).
-
-    An ANIMATION with the key STOP is sent to open pages and not stored.
-    """
+    """A message to the page: kind, node, key, and msgpack bytes; an ANIMATION with key STOP is sent and not stored."""
 
     op: bytes
     path: str = ""
@@ -144,11 +141,9 @@ class Queue:
 
 
 class Guard:
-    """Which requests a server of ours answers: those that call this machine by its name, from our own pages.
+    """Which requests a server of ours answers: to this machine's name, from our own pages."""
 
-    A request of any other name reached this machine by DNS rebinding. One with another origin is of a page of somebody
-    else that runs in the user's browser.
-    """
+    # another name reached this machine by DNS rebinding; another origin is somebody else's page in the user's browser
 
     def __init__(self, host: str) -> None:
         names = {*LOCAL, host.lower()}
@@ -231,11 +226,11 @@ class Server:
         """Wait until a tab shows the page; False if none did within `timeout` seconds."""
         return self._until(lambda: bool(self.tabs), timeout)
 
-    def wait_until_closed(self, timeout: float, grace: float = 2.0) -> bool:
-        """Wait until no tab has shown the page for `grace` seconds; False if one still did after `timeout` seconds."""
+    def wait_until_closed(self, timeout: float) -> bool:
+        """Wait until no tab has shown the page for two seconds; False if one still did after `timeout` seconds."""
         end = time.monotonic() + timeout
         while self._until(lambda: not self.tabs, end - time.monotonic()):
-            if not self.wait(min(grace, end - time.monotonic())):
+            if not self.wait(min(2.0, end - time.monotonic())):
                 return True
         return False
 

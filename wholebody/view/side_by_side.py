@@ -57,14 +57,8 @@ class _Body(NamedTuple):
 def beside(motion: SkeletonMotion | None, clips: Mapping[str, Clip], scene: Scene, title: str) -> Viewer:
     """A viewer that plays motions side by side, from the left to the right as they are given.
 
-    Args:
-        motion: the recorded skeleton, on the left; None for clips alone.
-        clips: name to a clip, of as many frames as the skeleton.
-        scene: what the figures carry, and what stands around, which every motion gets.
-        title: of the page.
-
-    Raises:
-        InputError: motions of other numbers of frames, or two names that differ in "/" and " " alone.
+    The recorded skeleton, if any, is on the left; clips have as many frames, and get what the scene's figures carry
+    and what stands around. InputError for other frames, or two names that differ in "/" and " " alone.
     """
     _check(motion, clips, scene)
     bodies = {name: _bodies(name, clip) for name, clip in clips.items()}
@@ -189,8 +183,7 @@ def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list
 
 def _along(way: Array) -> Array:
     """(3, 3) a rotation that brings z along a direction."""
-    found: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix()
-    return found
+    return np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix())
 
 
 GAP = 6  # pixels between two pictures

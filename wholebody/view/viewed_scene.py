@@ -33,10 +33,7 @@ class Colored:
 
 
 class ViewedAssembly:
-    """The bodies and things that an assembly has now, and its `figures`, each with the color that it was given.
-
-    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
-    """
+    """Bodies with shapes and things of an assembly, and its `figures`; a posture is `assembly.q` or a row of a path."""
 
     figure: Any = None
     revision = 0
@@ -84,11 +81,7 @@ def checked_scene(scene: Any) -> Any:
 
 
 class ViewedWorld:
-    """A figure, the things that stay, and things that move, which have joints here.
-
-    A posture is what `configuration` makes of one of the figure's and the placements of the things that move. So
-    `Viewer(ViewedWorld(scene, names)).play(configurations, dt)` shows all of them move.
-    """
+    """A figure, things that stay, and things that move, which have joints here; postures are of `configuration`."""
 
     revision = 0
 
@@ -118,5 +111,4 @@ def place_of(scene: ViewedScene, state: State, name: str) -> pin.SE3 | None:
     return None
 
 
-ViewedScene: TypeAlias = Scene | ViewedAssembly | ViewedWorld
-"""What the viewer shows."""
+ViewedScene: TypeAlias = Scene | ViewedAssembly | ViewedWorld  # what the viewer shows

@@ -15,11 +15,8 @@ _STARTING = threading.Lock()
 
 
 def viser_server(port: int, label: str) -> Any:
-    """A running viser.ViserServer on 127.0.0.1 at the port, or the next free one; `label` is its page's title.
-
-    viser passes no check of requests on to websockets: what it calls to serve is another function while it starts,
-    which adds the check. If viser does not call that, there is no server.
-    """
+    """A running viser.ViserServer on 127.0.0.1 at the port, or the next free one; `label` is its page's title."""
+    # viser hands no check to websockets: what it calls to serve is replaced while it starts, or there is no server
     whole(port, "the port of the page", 0, 65535)
     try:
         import rich

@@ -298,7 +298,7 @@ def test_a_middle_that_cannot_be_freed_ends_with_a_sentence(swing: Clip) -> None
 
 
 def test_a_search_that_other_starts_may_end_is_short(swing: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
-    lengths, short = list[int](), Bisection().short
+    lengths, short = list[int](), 25  # programs, as the docstring of `Bisection` says
 
     class Endless(wb.methods.QP):
         """Has its answer at once, and goes on until it is ended."""

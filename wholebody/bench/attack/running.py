@@ -71,7 +71,6 @@ def attack(
 
 
 def _attacked(case: Case, deadline: float) -> Verdict:
-    """Run a case, in a process of its own."""
     _prepare()
     allow_processor(deadline)
     with Scratch() as folder:

@@ -125,11 +125,7 @@ USERS = "users"  # module of the terms below: answers are checked of classes fro
 
 
 class Asked(NamedTuple):
-    """A request, and which answer of a term is bad.
-
-    `frame` is to move by `way` (3,) [m]. Beyond `reach` [m] along it the `part` (error, jacobian, value, slope,
-    measure, gradient or curvature) consists of the number `bad`, or is that answer.
-    """
+    """`frame` is to move by `way` (3,) [m]; beyond `reach` [m] along it the term's `part` is `bad`."""
 
     frame: str
     way: Array

@@ -118,11 +118,7 @@ TOOLS = ("wholebody", "mink, GMR's weights")
 
 
 def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator[Row]:
-    """A row for each recording of a folder (BVH), figure and tool; `frames` are the first ones that are followed.
-
-    Raises:
-        InputError: there is no recording.
-    """
+    """A row for each recording (BVH) in a folder, figure and tool, of `frames`; InputError without recordings."""
     files = sorted(folder.rglob("*.bvh"))
     if not files:
         raise InputError(f"{folder}: there are no .bvh files; give a folder of recordings")
@@ -141,8 +137,7 @@ def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator
 
 
 def _thinned(motion: SkeletonMotion) -> SkeletonMotion:
-    # recordings at more than twice 60 Hz are subsampled
-    every = max(1, round(1.0 / (motion.dt * 60.0)))
+    every = max(1, round(1.0 / (motion.dt * 60.0)))  # recordings at more than twice 60 Hz are subsampled
     parts = motion.rotations[::every], motion.positions[::every]
     return SkeletonMotion(motion.names, motion.parents, motion.offsets, *parts, motion.dt * every, motion.name)
 
@@ -320,8 +315,7 @@ def _rest_turn(role: str, own: dict[str, Array], rest: Array, joints: dict[str, 
             mine = role == first or (role == last and end == limb[2] and limb[0] == "shoulder")
             if mine and {first, last} <= own.keys() & joints.keys():
                 bones = own[last] - own[first], rest[joints[last]] - rest[joints[first]]
-                found: Array = pin.Quaternion.FromTwoVectors(*bones).toRotationMatrix()
-                return found
+                return np.asarray(pin.Quaternion.FromTwoVectors(*bones).toRotationMatrix())
     return np.eye(3)
 
 

@@ -62,8 +62,7 @@ def recordings(folder: Path | None) -> tuple[Path, ...]:
     return tuple(found)
 
 
-EQUIPMENT = (NOTHING, *READY)
-"""What a person wears."""
+EQUIPMENT = (NOTHING, *READY)  # what a person wears
 
 FIGURES: Mapping[str, Callable[[AvoidedCase], float]] = {
     "deviation rad": lambda case: case.angle,

@@ -29,11 +29,7 @@ others evicted from the caches; these are 2 %, so that they do not make the p95.
 
 
 class Run:
-    """One run of one tool.
-
-    `wall`, `cpu`: (steps,) microseconds by the clock and of the processor; `setup`: seconds; `postures`: (steps, nq)
-    after each step.
-    """
+    """One run of a tool: `wall`, `cpu` (steps,) [us], `setup` [s] and `postures` (steps, nq) after each step."""
 
     def __init__(self, track: Track, name: str) -> None:
         self.track, steps = track, len(track.targets)
@@ -61,8 +57,7 @@ class Run:
         return judge(self.track, self.postures)
 
 
-Runs = Mapping[str, Sequence[Run]]
-"""The repeats of each tool, by its name."""
+Runs = Mapping[str, Sequence[Run]]  # the repeats of each tool, by its name
 
 
 def measure(

@@ -27,17 +27,12 @@ VARIANTS = ("free", "contact", "alone")
 
 
 given = numbers("step")
-SETTING = given.told
-"""What every tool is told of a reach; see the end of `sets.toml`."""
+SETTING = given.told  # what every tool is told of a reach; see the end of `sets.toml`
 
 
 @dataclass(frozen=True)
 class Track:
-    """One reach, the same for every tool.
-
-    `start` (nq,); `targets` (steps, 3) of the frame `tip` [m]; `feet` stay where they are; every pair keeps `clearance`
-    [m].
-    """
+    """One reach: `start` (nq,), `targets` (steps, 3) of `tip` [m], feet that stay, a `clearance` [m] of pairs."""
 
     name: str
     scene: wb.Scene

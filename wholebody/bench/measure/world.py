@@ -251,8 +251,7 @@ class Judge:
         return depth
 
 
-Path = Sequence[tuple[float, Array]]
-"""Shares of a frame, and postures (nq,)."""
+Path = Sequence[tuple[float, Array]]  # shares of a frame, and postures (nq,)
 
 DT = 1.0 / 60.0
 SHAPES = {
@@ -264,10 +263,7 @@ SHAPES = {
 
 
 class Throw:
-    """A thing that flies towards the body of a standing person with constant velocity, and turns.
-
-    `truth` is the scene once more, for judgements; `at`: where the thing is; `frames`: until it is past.
-    """
+    """A thing that flies and turns towards a person; `truth` is the scene for judgements, `at` tells where it is."""
 
     def __init__(self, rng: np.random.Generator, shape: wb.Shape, speed: float, turn: float = 3.0) -> None:
         """Begin half a metre before the body, from anywhere around; `speed` in m/s, `turn` in rad/s."""

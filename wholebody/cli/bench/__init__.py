@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from wholebody.cli.arguments import JOBS
 from wholebody.cli.bench.command import CLIPS, folders, listed, measuring, quick, seed
-from wholebody.cli.command import Group, command, count, flag, later, option
+from wholebody.cli.command import Group, command, count, flag, later, path, real, text, whole
 
-PROBLEMS = option("--problems", type=Path, required=True, metavar="DIR", help="folder of the exported problems")
+PROBLEMS = path("--problems", "DIR", "folder of the exported problems", required=True)
 
 group = Group(
     "bench",
@@ -28,12 +26,7 @@ interrupted run again with the same settings and folder to continue it; a finish
 --again compares times in units of a reference kernel; the exit code is 1 if the solved problems differ. --jobs solves
 cases in parallel by joblib, --cluster on a dask cluster.""",
             quick("20 problems a set, within three minutes on two cores"),
-            option(
-                "--task",
-                type=Path,
-                metavar="TASK.toml",
-                help="compare on the problem of a task file, in place of the sets",
-            ),
+            path("--task", "TASK.toml", "compare on the problem of a task file, in place of the sets"),
             listed("--sets", "problem sets (default: all)"),
             listed(
                 "--methods",
@@ -41,11 +34,11 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
                 "one start and from several; with --quick with their usual starts)",
             ),
             count("--cases", None, "problems of each set (default: 200)"),
-            option("--minutes", type=float, metavar="N", help="of solving in all (default: 25; with --quick 2)"),
+            real("--minutes", "N", "of solving in all (default: 25; with --quick 2)"),
             seed("of all problems"),
             *JOBS,
             flag("--held-out", "pose problems of distributions that no constant was tuned on"),
-            option("--again", type=Path, metavar="LOCK.json", help="repeat the comparison that left this file"),
+            path("--again", "LOCK.json", "repeat the comparison that left this file"),
             *folders("out/compare"),
         )(later("bench.comparing.compare")),
         command(
@@ -55,7 +48,7 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
 Write the problems of the sets as files that any program reads: JSON with a schema, the body as URDF, meshes as OBJ, two
 seeds each (near: the start; far: random), what must hold, and apart from them a posture that solves each, with measures
 of how hard it is. The same sets, number and seed give the same files. They are in the public domain (CC0).""",
-            option("folder", type=Path, metavar="DIR", help="a folder that does not exist yet"),
+            path("folder", "DIR", "a folder that does not exist yet"),
             listed("--sets", "problem sets (default: all)"),
             count("--per-set", None, "problems of each set (default: 200)"),
             seed("of all problems"),
@@ -66,12 +59,10 @@ of how hard it is. The same sets, number and seed give the same files. They are 
             """\
 Solve the problems that `wholebody bench export` wrote by one method, from both seeds, and write the file of answers
 that `wholebody bench judge` scores. What the method refuses is written with its reason.""",
-            option("folder", type=Path, metavar="DIR", help="folder of the exported problems"),
-            option("--method", default="qp", metavar="NAME", help="such as qp or my_module:MyMethod (default: qp)"),
+            path("folder", "DIR", "folder of the exported problems"),
+            text("--method", "NAME", "such as qp or my_module:MyMethod (default: qp)", default="qp"),
             listed("--sets", "problem sets (default: all of the export)"),
-            option(
-                "--out", type=Path, metavar="PATH", help="where the answers are written (default: METHOD.answers.json)"
-            ),
+            path("--out", "PATH", "where the answers are written (default: METHOD.answers.json)"),
         )(later("bench.published.answer")),
         command(
             "judge",
@@ -82,15 +73,12 @@ overlap of all pairs, clearances, joint limits, what is held, and effort above t
 from the files by Pinocchio and coal alone. Prints a table, and writes every figure as JSON. Answers that are malformed
 are refused with one sentence that names the entry. Of a folder with a file of answers for each method it makes a
 leaderboard: a page with tables, charts and sentences that say what to choose when, and what cannot be told apart.""",
-            option(
-                "answers", type=Path, metavar="ANSWERS", help="a file, as answers.schema.json says, or a folder of them"
-            ),
+            path("answers", "ANSWERS", "a file, as answers.schema.json says, or a folder of them"),
             PROBLEMS,
-            option(
+            path(
                 "--out",
-                type=Path,
-                metavar="PATH",
-                help="where the verdict is written (default: ANSWERS.verdict.json; of a folder out/leaderboard)",
+                "PATH",
+                "where the verdict is written (default: ANSWERS.verdict.json; of a folder out/leaderboard)",
             ),
         )(later("bench.published.judge_answers")),
         measuring(
@@ -112,7 +100,7 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
             "figures replace the standing human; tools that do not take one say why.",
             listed("--figure", "URDF or MJCF files, or names of figures", "FILE"),
             count("--repeats", 5, "timed runs of every tool"),
-            option("--steps", type=int, default=200, metavar="N", help="of each run (default: 200)"),
+            whole("--steps", "N", "of each run (default: 200)", default=200),
             listed("--tools", "only these (default: all that are installed)"),
         )(later("bench.measurements.measure_step")),
         measuring(
@@ -149,7 +137,7 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
             "Read every robot, mesh and recording below a folder; recordings are retargeted to the person. The table "
             "has what was read, the sentence by which the rest is refused, the errors of bones, and the processor's "
             "time.",
-            option("folder", type=Path, metavar="FOLDER", help="of the files"),
+            path("folder", "FOLDER", "of the files"),
             count("--frames", 60, "frames of each recording that are retargeted"),
             flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
             listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
@@ -163,7 +151,7 @@ reach; streams; sweeps; contacts beside points at the place found; mutated files
 pairs and by Pinocchio alone. Every failure is written as a script that repeats it. Case K of a seed is
 always the same. The exit code is 1 where something was wrong: a false claim, an error other than one sentence, a crash,
 or no end within a minute. What ended before Ctrl-C is written.""",
-            option("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)"),
+            real("--seconds", "S", "how long (default: 60)", default=60.0),
             seed("of all cases"),
             count("--first", 0, "number of the first case", least=0),
             count("--cases", None, "end after as many cases, if the time suffices"),

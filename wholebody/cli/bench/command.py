@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wholebody.bench.tables import publish_text, write_rows, write_text
-from wholebody.cli.command import Command, Measure, Option, command, count, flag, option
+from wholebody.cli.command import Command, Measure, Option, command, count, flag, option, path
 
 
 def measuring(name: str, help: str, description: str, *options: Option) -> Callable[[Measure], Command]:
@@ -26,13 +26,11 @@ def quick(help: str) -> Option:
 
 def folders(out: str) -> tuple[Option, Option]:
     """`--out`, with a folder where it is left out, and `--update-docs`."""
+    told = "write tables and charts into the documentation too (default folder: docs)"
     return (
-        option("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})"),
-        option(
-            "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-            help="write tables and charts into the documentation too (default folder: docs)",
-        ),
-    )  # fmt: skip
+        path("--out", "DIR", f"folder (default: {out})", default=Path(out)),
+        path("--update-docs", "DOCS", told, nargs="?", const=Path("docs")),
+    )
 
 
 def listed(name: str, help: str, metavar: str | None = "NAME", **settings: Any) -> Option:
@@ -46,7 +44,7 @@ def seed(of: str) -> Option:
 
 
 CLIPS = (
-    option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),
+    path("--clips", "DIR", "folder of recordings (BVH), beside the built-in clips"),
     listed("--only", "names of clips (default: all)", "CLIP"),
 )
 

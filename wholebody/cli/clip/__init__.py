@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from wholebody.cli.arguments import JOBS, add_person
-from wholebody.cli.command import Group, Option, command, flag, later, option
+from wholebody.cli.command import Group, Option, command, flag, later, option, path, real, text, whole
 
 
 def _figure(parser: argparse.ArgumentParser) -> None:
@@ -20,20 +19,17 @@ def _figure(parser: argparse.ArgumentParser) -> None:
     )
 
 
-SCENE = option("--scene", type=Path, metavar="TASK.toml", help="task file with the figures and their things")
+SCENE = path("--scene", "TASK.toml", "task file with the figures and their things")
 
-ONE_MOTION: tuple[Option, ...] = (option("file", type=Path, metavar="FILE", help="the motion"), _figure, SCENE)
+ONE_MOTION: tuple[Option, ...] = (path("file", "FILE", "the motion"), _figure, SCENE)
 """The file of a motion, and the figure or the scene that it moves."""
 
-MOTIONS: tuple[Option, ...] = (option("files", type=Path, nargs="+", metavar="FILE", help="the motions"), _figure)
+MOTIONS: tuple[Option, ...] = (path("files", "FILE", "the motions", nargs="+"), _figure)
 
-EQUIPMENT = option(
-    "--equipment", action="append", default=[], metavar="WHAT",
-    help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back; "
-    "repeated, each in turn",
-)  # fmt: skip
+WORN = "what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back"
+EQUIPMENT = text("--equipment", "WHAT", f"{WORN}; repeated, each in turn", action="append", default=[])
 
-PAGE = option("--html", type=Path, metavar="FILE", help="write curves over time and a film beside the recording")
+PAGE = path("--html", "FILE", "write curves over time and a film beside the recording")
 
 BARE = flag("--bare", "CSV without names and times, as tools that train robots take it")
 
@@ -57,8 +53,8 @@ greatest speed.""",
 Write a motion in another format: .npz (without loss), .bvh, .csv, .txt (joint profile) or .glb (glTF animation).
 A skeleton that is not the figure's own is retargeted.""",
             *ONE_MOTION,
-            option("out", type=Path, metavar="OUT", help="the file to write"),
-            option("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)"),
+            path("out", "OUT", "the file to write"),
+            real("--dt", "S", "seconds from frame to frame (default: as it is)"),
             BARE,
             flag("--mirror", "exchange left and right"),
             epilog="""\
@@ -76,13 +72,11 @@ that overlap themselves or the floor are told. A table has the errors of bones; 
 between frames. A robot's .npz has the arrays that mjlab, BeyondMimic and GMR name. Several files are written into a
 folder; those that it holds are not made again.""",
             *MOTIONS,
-            option("--to", metavar="FIGURE", help="another name of --figure; a robot goes about freely"),
-            option(
-                "--out", type=Path, metavar="OUT", help=".npz, .bvh, .csv, .txt or .glb; of several motions a folder"
-            ),
-            option("--rate", type=float, metavar="HZ", help="frames a second that are written (default: as recorded)"),
+            text("--to", "FIGURE", "another name of --figure; a robot goes about freely"),
+            path("--out", "OUT", ".npz, .bvh, .csv, .txt or .glb; of several motions a folder"),
+            real("--rate", "HZ", "frames a second that are written (default: as recorded)"),
             BARE,
-            option("--names", type=Path, metavar="FILE.toml", help="which bone is which part"),
+            path("--names", "FILE.toml", "which bone is which part"),
             option(
                 "--ground",
                 choices=("auto", "none"),
@@ -90,15 +84,15 @@ folder; those that it holds are not made again.""",
                 help="find where feet rest, or follow the skeleton alone",
             ),
             SCENE,
-            option(
+            text(
                 "--track",
+                "THING=FILE",
+                "where a thing of the scene is in each frame: a line of x y z, or x y z qx qy qz qw; "
+                "repeated for others",
                 action="append",
                 default=[],
-                metavar="THING=FILE",
-                help="where a thing of the scene is in each frame: a line of x y z, or x y z qx qy qz qw; "
-                "repeated for others",
             ),
-            option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
+            text("--unit", "UNIT", "of lengths, such as centimetres (default: recognised)"),
             option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
             PAGE,
             *JOBS,
@@ -118,22 +112,15 @@ Show a motion. Without --out a page opens in the browser and plays it; with --ou
 without a network (.html), as glTF (.glb), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its
 ghost. With --equipment the body is shown with what it wears, with --scene the figures among their things.""",
             *ONE_MOTION,
-            option("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent"),
-            option(
+            path("--ghost", "FILE", "another motion of the figure, shown transparent"),
+            path(
                 "--beside",
-                type=Path,
-                metavar="FILE",
-                help="what it was made from, beside it: the recorded skeleton as bones, and the figure that follows it",
+                "FILE",
+                "what it was made from, beside it: the recorded skeleton as bones, and the figure that follows it",
             ),
-            option(
-                "--equipment",
-                default="nothing",
-                metavar="WHAT",
-                help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its "
-                "back",
-            ),
-            option("--out", type=Path, metavar="OUT", help=".html, .glb, .mp4, .gif or .png"),
-            option("--pictures", type=int, default=8, metavar="N", help="of a strip (default: 8)"),
+            text("--equipment", "WHAT", WORN, default="nothing"),
+            path("--out", "OUT", ".html, .glb, .mp4, .gif or .png"),
+            whole("--pictures", "N", "of a strip (default: 8)", default=8),
             epilog="""\
 examples:
   wholebody clip play walk.bvh
@@ -153,9 +140,9 @@ carries and with the things around it are told apart. Several motions, or pieces
             EQUIPMENT,
             *JOBS,
             SCENE,
-            option("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)"),
+            real("--depth", "MM", "deepest overlap that is no contact (default: 0.1)"),
             flag("--json", "print everything as JSON instead of tables"),
-            option("--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"),
+            path("--html", "FILE", "write a timeline to look at; opens without a network"),
             epilog="""\
 examples:
   wholebody clip check walk.bvh
@@ -176,27 +163,19 @@ Several motions, pieces of equipment or methods are a batch: each motion with ea
 into a folder with a table (cases.csv, cases.jsonl). Cases that the folder holds are not done again, so an interrupted
 batch continues.""",
             *MOTIONS,
-            option(
-                "--method",
-                action="append",
-                default=[],
-                metavar="NAME",
-                help="how (default: trajectory); repeated, each in turn",
-            ),
+            text("--method", "NAME", "how (default: trajectory); repeated, each in turn", action="append", default=[]),
             EQUIPMENT,
             SCENE,
             flag("--dynamics", "keep torques within the strength of a median person, and the balance within the feet"),
-            option(
+            real(
                 "--stretch",
-                type=float,
-                metavar="FACTOR",
-                help="slow the motion by up to this factor where joints are too fast or, with --dynamics, too weak",
+                "FACTOR",
+                "slow the motion by up to this factor where joints are too fast or, with --dynamics, too weak",
             ),
-            option(
+            path(
                 "--out",
-                type=Path,
-                metavar="OUT",
-                help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
+                "OUT",
+                "the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
             ),
             PAGE,
             *JOBS,

@@ -20,8 +20,7 @@ from wholebody.figures.tables import table
 _ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _AHEAD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
-SPREAD = 3
-"""Number of the piece of the thigh that is the flesh that spreads on a seat."""
+SPREAD = 3  # number of the piece of the thigh that is the flesh that spreads on a seat
 
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
@@ -71,8 +70,7 @@ def _arm(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     low, below = 0.88 * arm, person.size("elbow_below")
     yield _between(f"{name}:1", name, low, (0.0, 0.0, -0.55 * upper), (low - elbow, 0.0, low - below - upper))
     thick, wrist = RELAXED * radius("forearm"), radius("wrist")
-    # The underside of the bent forearm is level with the elbow's.
-    up, name = thick - below, f"{side}_forearm"
+    up, name = thick - below, f"{side}_forearm"  # the underside of the bent forearm is level with the elbow's
     yield _between(f"{name}:0", name, thick, (up, 0.0, elbow - thick), (up, 0.0, -0.40 * fore))
     yield _between(f"{name}:1", name, wrist, (0.0, 0.0, -0.45 * fore), (0.0, 0.0, wrist - fore))
 

@@ -127,11 +127,7 @@ def avatar_spec(person: Person | None = None, detail: str = "capsules") -> BodyS
 
 
 def avatar_figure(detail: str = "capsules", **who: Any) -> Figure:
-    """Return the avatar; arguments as for the person.
-
-    Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
-    shoulder girdle and upper neck fixed.
-    """
+    """Return the avatar of Schmidl & Lin: the person on a rigid torso; arguments as for the person."""
     return figure_of(avatar_spec(make_person(**who), detail), detail)
 
 

@@ -28,8 +28,7 @@ from wholebody.geometry.meshes import check_content
 FREE, BALL, SLIDE, HINGE = range(4)
 """Types of joints, as MuJoCo numbers them."""
 
-RGB = 1
-"""What a texture of a material is for: its colour, as MuJoCo numbers it."""
+RGB = 1  # what a texture of a material is for: its colour, as MuJoCo numbers it
 
 
 def is_mjcf(path: Path) -> bool:

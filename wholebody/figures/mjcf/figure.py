@@ -139,7 +139,6 @@ def _visual(compiled: Compiled, robot: RobotModel) -> pin.GeometryModel | None:
 
 
 def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, Color]:
-    """The colour of a body's first geom that has one."""
     found = {}
     for body in robot.bodies:
         color = next(filter(None, map(compiled.color, compiled.geoms(body))), None)

@@ -17,10 +17,7 @@ __all__ = ["Bone", "Patch", "Surface", "surface_of"]
 
 
 def surface_of(figure: Any) -> Surface | None:
-    """Return the surface of a person, an avatar or a hand; None for another figure.
-
-    It is made when it is first needed, and kept in the user's cache folder.
-    """
+    """Return the surface of a person, an avatar or a hand, made once and cached; None for another figure."""
     person = figure.describe().person if isinstance(figure, Figure) else None
     hands = [side for side in ("left", "right") if person and f"{side}_hand" in figure.segments]
     if person is None or ("pelvis" not in figure.segments and len(hands) != 1):

@@ -9,8 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 
-Field = Callable[[Array], Array]
-"""From points (n, 3) to signed distances (n,), exact or nearly so close to the surface."""
+Field = Callable[[Array], Array]  # from points (n, 3) to signed distances (n,), exact or nearly so close to the surface
 
 
 def round_cone(start: Any, end: Any, first: float, last: float) -> Field:

@@ -50,10 +50,7 @@ class Surface(NamedTuple):
     patches: tuple[Patch, ...]
 
     def attached(self, figure: Articulated, at: Array) -> list[tuple[str, Array]]:
-        """The joint of a figure that carries each bone, and the bone in it (4, 4); some figures lack segments.
-
-        `at` (4, 4) is where the figure's world is, on which those of a fixed root hang.
-        """
+        """The joint that carries each bone, and the bone in it (4, 4), in a figure whose world is `at` (4, 4)."""
         found = []
         for bone in self.bones:
             segment, extra = bone.segment, np.eye(4)

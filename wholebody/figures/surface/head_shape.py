@@ -91,7 +91,6 @@ def _hair(female: bool) -> Field:
 
 
 def _part(name: str) -> Field:
-    """All solids of a part of `head.toml`."""
     return union(_solids(name))
 
 
@@ -109,5 +108,4 @@ def _solids(name: str) -> list[Field]:
     return made
 
 
-PLACES = {"ball": 1, "ellipsoid": 1, "cone": 2}
-"""How many of the numbers of each kind of solid are places."""
+PLACES = {"ball": 1, "ellipsoid": 1, "cone": 2}  # how many of the numbers of each kind of solid are places

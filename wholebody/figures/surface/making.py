@@ -17,8 +17,7 @@ from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.nets import Triangles, coarsened, triangles
 from wholebody.figures.surface.person_shape import COLORS, HALVES, PersonShape
 
-BONES_EACH = 4
-"""Bones that move a vertex: as many as a page's shader takes."""
+BONES_EACH = 4  # bones that move a vertex: as many as a page's shader takes
 
 
 class Part(NamedTuple):
@@ -64,10 +63,7 @@ def hand_surface(person: Person, side: str) -> Surface:
 
 
 def halfway(first: Array, second: Array, slide: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-    """The placement (4, 4) of a half bone, whose rotation is half way from the first's to the second's.
-
-    It is at the second's origin but for its `slide` (3,) times 1 - cosine of the angle between the two z axes.
-    """
+    """Placement (4, 4) of a half bone at the second's origin + `slide` (3,) (1 - cosine of the z axes)."""
     turn = pin.log3(first[:3, :3].T @ second[:3, :3])
     found = np.array(second)
     found[:3, :3] = first[:3, :3] @ pin.exp3(0.5 * turn)
@@ -173,8 +169,7 @@ def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.i
 
     whole = cuts == 0
     made, owners = [faces[whole]], [theirs[whole, 0]]
-    # Two segments: the corner that is alone comes first.
-    two, of_two = faces[cuts == 2], theirs[cuts == 2]
+    two, of_two = faces[cuts == 2], theirs[cuts == 2]  # two segments: the corner that is alone comes first
     alone = np.argmax([(of_two != of_two[:, k : k + 1]).sum(axis=1) == 2 for k in range(3)], axis=0)
     order = (alone[:, None] + np.arange(3)) % 3
     v0, v1, v2 = np.take_along_axis(two, order, axis=1).T
@@ -182,8 +177,7 @@ def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.i
     m1, m2 = cut(v0, v1), cut(v0, v2)
     made += [np.stack(corners, axis=1) for corners in ((v0, m1, m2), (m1, v1, v2), (m1, v2, m2))]
     owners += [mine, rest, rest]
-    # Three segments: a vertex in the middle.
-    three, of_three = faces[cuts == 3], theirs[cuts == 3]
+    three, of_three = faces[cuts == 3], theirs[cuts == 3]  # three segments: a vertex in the middle
     middle = len(bound.vertices) + np.arange(len(three))
     bound = bound.with_means(three, np.full(three.shape, 1.0 / 3.0))
     for k in range(3):

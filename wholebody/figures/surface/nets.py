@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.figures.surface.fields import Field, intersection
 
-BLOCK = 4
-"""Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""
+BLOCK = 4  # cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone
 
-STEEPEST = 1.8
-"""Largest slope of a field near its surface; of a distance it is 1."""
+STEEPEST = 1.8  # largest slope of a field near its surface; of a distance it is 1
 
 
 class Triangles(NamedTuple):
@@ -58,14 +56,10 @@ def triangles(field: Field, low: Array, high: Array, cell: float, cuts: Sequence
 
 
 def coarsened(surface: Triangles) -> NDArray[np.int64]:
-    """Return fewer and larger triangles (m, 3) between the vertices of a closed surface; it stays closed.
-
-    Vertex clustering: Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes", 1993.
-    """
+    """Return fewer triangles (m, 3) of a closed surface, which stays closed (Rossignac and Borrel 1993)."""
     vertices, faces = surface.vertices, surface.faces
     edges = vertices[faces] - vertices[np.roll(faces, 1, axis=1)]
-    # 2 saves no more time and loses eyes and lips.
-    cell = 1.6 * np.median(np.linalg.norm(edges, axis=-1))
+    cell = 1.6 * np.median(np.linalg.norm(edges, axis=-1))  # 2 saves no more time and loses eyes and lips
     across = np.cross(edges[:, 1], edges[:, 2])
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
     # cosine of the angle between a triangle and the normal at its corner, below which the corner is on a sharp
@@ -111,8 +105,7 @@ def _values(field: Field, start: Array, blocks: NDArray[np.int64], cell: float) 
     points = start + cell * (BLOCK * numbers[near][:, None, :] + steps)
     found[near] = field(points.reshape(-1, 3)).reshape(-1, BLOCK**3)
     shape = (*blocks, BLOCK, BLOCK, BLOCK)
-    whole: Array = found.reshape(shape).transpose(0, 3, 1, 4, 2, 5).reshape(tuple(blocks * BLOCK))
-    return whole
+    return np.asarray(found.reshape(shape).transpose(0, 3, 1, 4, 2, 5).reshape(tuple(blocks * BLOCK)))
 
 
 _CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
@@ -163,7 +156,6 @@ def _slopes(field: Field, points: Array, values: Array) -> Array:
 
 
 def _moved(field: Field, vertices: Array, cell: float) -> Array:
-    """The vertices moved to the surface."""
     start, points = vertices, vertices
     # steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the
     # error

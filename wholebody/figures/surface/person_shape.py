@@ -49,8 +49,7 @@ class _Colors(NamedTuple):
 
 COLORS = _Colors()
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
-CLOTH = 0.003
-"""Thickness of shirt and trousers, metres."""
+CLOTH = 0.003  # thickness of shirt and trousers, metres
 
 SIDES = (("left", 1.0), ("right", -1.0))
 HALVES = {"upper_arm": "clavicle", "forearm": "upper_arm", "hand": "forearm", "thigh": "pelvis", "shank": "thigh"}

@@ -13,17 +13,13 @@ from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.surface.fields import Field, ball, box, ellipsoid, placed, round_cone
 
-LEVEL = 0.005
-"""Metres between two ovals."""
+LEVEL = 0.005  # metres between two ovals
 
-SMOOTHING = 0.028
-"""Standard deviation, metres, of the smoothing of the outline along the trunk and the limbs."""
+SMOOTHING = 0.028  # standard deviation, metres, of the smoothing of the outline along the trunk and the limbs
 
-ROUNDNESS = 2.3
-"""Exponent of the ovals: 2 is an ellipse, more is nearer to a rectangle."""
+ROUNDNESS = 2.3  # exponent of the ovals: 2 is an ellipse, more is nearer to a rectangle
 
-RAYS = np.arange(-0.4, 0.4, 0.002)
-"""Metres from the middle at which the pieces are looked for."""
+RAYS = np.arange(-0.4, 0.4, 0.002)  # metres from the middle at which the pieces are looked for
 
 
 def piece_field(solid: Solid) -> Field:
@@ -64,10 +60,7 @@ def _contains(outer: Field, solid: Solid) -> bool:
 
 
 def limb(balls: Sequence[tuple[Array, float]], smoothing: float = SMOOTHING) -> Field:
-    """A smooth solid around balls in a row, centres (3,) and radii: middle line and radius run evenly along them.
-
-    `smoothing` is the standard deviation along them, metres: cloth spans the hollows between muscles.
-    """
+    """A smooth solid around balls, centres (3,) and radii, smoothed by `smoothing` along them [m]."""
     centers, radii = np.array([center for center, _ in balls]), np.array([radius for _, radius in balls])
     start, span = centers[0], centers[-1] - centers[0]
     length = float(np.linalg.norm(span))

@@ -183,8 +183,7 @@ def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:
     model.velocityLimit, model.effortLimit = velocity, effort
 
 
-SAMPLES = 400
-"""Number of random postures for finding pairs that always overlap."""
+SAMPLES = 400  # number of random postures for finding pairs that always overlap
 
 
 def urdf_figure(
@@ -217,7 +216,6 @@ def urdf_figure(
 
 
 def _described(robot: Robot, path: Path) -> Robot:
-    """The robot with what its SRDF says."""
     known = read_srdf(path, robot.model, robot.links)
     owners = [robot.model.frames[piece.parentFrame].name for piece in robot.geometry.geometryObjects]
     return with_values(

@@ -19,8 +19,7 @@ from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_robot, unique_names
 from wholebody.geometry.pieces import LARGEST
 
-EXTENSION = "wholebody"
-"""Name of the element of our extension; see `wholebody.figures.urdf.extension`."""
+EXTENSION = "wholebody"  # name of the element of our extension; see `wholebody.figures.urdf.extension`
 
 
 class LinkVisual(NamedTuple):
@@ -39,8 +38,7 @@ class UrdfFile(NamedTuple):
     inertials: dict[str, Element]  # link to its ``<inertial>`` element
     joints: tuple[UrdfJoint, ...]  # in the order of the file
     shapes: tuple[LinkShape, ...]  # collision shapes in the order of the file
-    # link to red, green, blue, alpha of the first of its visuals that has a colour
-    colors: dict[str, Color]
+    colors: dict[str, Color]  # link to red, green, blue, alpha of the first of its visuals that has a colour
     visuals: tuple[LinkVisual, ...]  # what the file wants drawn, without what is wholly transparent or cannot be read
     extension: Element | None  # the element `EXTENSION`, or None
     notes: tuple[str, ...]  # one sentence for each missing part that was filled in

@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 
-FOLLOWS = "JointModelMimic"
-"""Pinocchio's name of a joint that follows another."""
+FOLLOWS = "JointModelMimic"  # Pinocchio's name of a joint that follows another
 
 ANY_LIMIT = {"lower": -1.0, "upper": 1.0, "effort": 1.0, "velocity": 1.0}
 """A limit where a URDF must have one, for readers that get the real one elsewhere."""

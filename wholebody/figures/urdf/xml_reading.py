@@ -16,8 +16,7 @@ from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
-MOST = 1e9
-"""Largest number that is accepted as a mass, a length, a speed or an inertia in SI units."""
+MOST = 1e9  # largest number that is accepted as a mass, a length, a speed or an inertia in SI units
 
 
 def read_xml(path: Path, kind: str) -> Element:

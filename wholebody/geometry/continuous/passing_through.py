@@ -69,11 +69,7 @@ class Entered(NamedTuple):
 def entered(
     sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]
 ) -> list[Entered]:  # fmt: skip
-    """The pairs that penetrate on a path or at its end; none if the path or the direct motion is free.
-
-    They get deeper within it by `OVERLAP`, or overlap at the end by `INSIDE`, for pairs not watched (pairs,) more than
-    at the beginning. The path has one configuration (nq,) or more.
-    """
+    """Pairs that get deeper by `OVERLAP` on a path of postures, or by `INSIDE` at its end, unless it is free."""
     last = _by_pair(depths.start(path[-1]), len(watched))
     paths = ((path[0], path[-1]), path) if len(path) > 2 else (path,)
     if not (last > INSIDE).any() and any(_is_clear(sweep, way) for way in paths):

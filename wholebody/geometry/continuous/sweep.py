@@ -25,11 +25,9 @@ from wholebody.geometry.continuous.swept_depth import compiled_kernel, shapes_of
 from wholebody.geometry.pair_distances import PairDistances
 from wholebody.geometry.proximity import PairTable
 
-TOLERANCE = 1e-4
-"""Depth up to which an overlap is no contact, metres."""
+TOLERANCE = 1e-4  # depth up to which an overlap is no contact, metres
 
-MOST_QUERIES = 4000
-"""Most queries of a motion, some 40 us each; ordinary motions take 10 to 100."""
+MOST_QUERIES = 4000  # most queries of a motion, some 40 us each; ordinary motions take 10 to 100
 
 TOGETHER = 0.05
 """Pairs due within this share of the motion are queried together: a query costs more than the pairs in it."""

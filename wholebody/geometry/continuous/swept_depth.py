@@ -97,8 +97,7 @@ class SweptDepth:
             now.places, (table.pairs, table.reach, table.half), speed, before, now.least, self._extent, self._index
         )
         now.exact[:] = False
-        screened: Indices = self._index[:count].copy()
-        return screened
+        return np.asarray(self._index[:count].copy())
 
     def _overlaps(self, numbers: Indices) -> Depths:
         """Those of some pairs that overlap at the present posture."""

@@ -18,17 +18,9 @@ def screen(
 ) -> int:  # fmt: skip
     """Bound the distances after a motion from below, and list the pairs that may overlap at its end or on its way.
 
-    Args:
-        place: (n, 4, 3) where the pieces are after the motion; see `Contacts.placements`.
-        table: `pairs`, `reach` and `half` of the pair table.
-        speed: (p,) by how much a pair can have come nearer during the motion, metres.
-        before: (p,) lower bounds of the distances before it.
-        after: (p,) room for those after it: from the motion, from spheres and from boxes along the world's axes.
-        extent: (n, 3) room for the sizes of the boxes.
-        index: (p,) room for the pairs of the answer.
-
-    Returns:
-        How many pairs there are.
+    `place` (n, 4, 3): the pieces after it. `speed` (p,): by how much a pair can have come nearer, metres. `before` and
+    `after` (p,): bounds before it, and room for those after it, from the motion, spheres and boxes of sizes `extent`
+    (n, 3); `index` (p,) has room for the answer, whose length is returned.
     """
     pairs, reach, half = table
     bound_by_boxes(place, half, extent)
@@ -149,11 +141,8 @@ class Sliding(NamedTuple):
 
 @compiled()
 def keep_apart(sliding: Sliding, shapes: Shapes, motion: Speeds, safe: Array) -> None:
-    """Raise the shares `safe` (k,) of a motion for which pairs stay apart, from heights above planes to second order.
-
-    A height has its exact rate now, and an acceleration of at most `_curvature`. The planes are across coal's normal
-    and across that of the face nearest to it, from which coal's can be 1e-4 rad off where faces touch.
-    """
+    """Raise the shares `safe` (k,) of a motion in which pairs stay apart, from heights above planes to second order."""
+    # planes across coal's normal and across the nearest face's, which coal's is up to 1e-4 rad off where faces touch
     asked, rows, level, place, _ = sliding
     pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
     outline, limits = (points, first_point, radius, radii), (motion.turn, motion.speed, motion.carries)
@@ -255,8 +244,7 @@ def _curvature(
     return total
 
 
-Outline: TypeAlias = tuple[Array, Indices, Array, Array]
-"""`points`, `first_point`, `radius` and `radii` of `Shapes`."""
+Outline: TypeAlias = tuple[Array, Indices, Array, Array]  # `points`, `first_point`, `radius` and `radii` of `Shapes`
 
 
 @compiled(inner=True)

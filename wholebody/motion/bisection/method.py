@@ -49,7 +49,7 @@ class Bisection(Checked):
     Attributes:
         evaluation: frames that characterise the motion. They are corrected first and never interpolated; so are the
             first and the last frame. None for the frames from which linear interpolation misses no original posture by
-            more than `character`; () for none but both ends.
+            more than 0.2 rad or m; () for none but both ends.
         buffer: percentage of the frames of a group by which it is widened to each side before it is interpolated.
         least: least number of frames in a group, where there is room.
         interpolation: "linear" or "quadratic", between the frames beside the group and its middle.
@@ -59,11 +59,8 @@ class Bisection(Checked):
             ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.methods.QP(solver="daqp")`. "qp" is
-            `wb.methods.QP(restarts=0, iterations=50)`, ended after `short` programs where another start or way is left:
-            a free root too is let go where no start frees a frame in so many.
-        character: radians and metres that interpolation between evaluation points may miss of the original; less
-            follows the original more closely and predicts more postures.
-        short: programs after which a prediction of "qp" is ended where others may be tried.
+            `wb.methods.QP(restarts=0, iterations=50)`, ended after 25 programs where another start or way is left: a
+            free root too is let go where no start frees a frame in so many.
 
     Raises:
         InputError: a value of the wrong kind, shape or range.
@@ -85,8 +82,6 @@ class Bisection(Checked):
     frozen: Annotated[tuple[str, ...], _names] | None = None
     room: Annotated[float, Range(0.0, 0.1, "m")] = 0.005
     method: str | Method = "qp"
-    character: Annotated[float, Range(0.0, 100.0)] = 0.2
-    short: Annotated[int, COUNT] = 25
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -119,19 +114,13 @@ class Bisection(Checked):
             return self.evaluation
         moving = np.ones(figure.model.nv, dtype=bool)
         moving[figure.dofs(frozen)] = False
-        return key_frames(figure.model, original, moving, self.character)
+        return key_frames(figure.model, original, moving, 0.2)  # less predicts more postures, nearer to the original
 
 
 class Recursion:
     """The recursion of figure 3.2 of the thesis: predict a middle frame, interpolate beside it, go into both halves.
 
     Groups end at frames that were predicted, so it ends after at most one prediction a frame.
-
-    Attributes:
-        q: (n, nq) the present postures.
-        bad: (n,) which of them overlap.
-        keys: frames that were predicted and are free, and evaluation points; they do not change again.
-        stuck: frames whose prediction failed.
     """
 
     def __init__(self, predictor: Predictor, settings: Bisection) -> None:
@@ -141,14 +130,14 @@ class Recursion:
         swinging = (f"{side}_{part}" for part in ("elbow", "ankle") for side in ("left", "right"))
         usual = tuple(name for name in swinging if name in figure.frames)
         self._planes = usual if settings.planes is None else settings.planes
-        # nine in ten predictions take at most 20 programs
-        self._short = settings.short if settings.method == "qp" else None
+        self._short = 25 if settings.method == "qp" else None  # nine in ten predictions take at most 20 programs
         self._state, self._whole = State(run.scene.model), True
-        self.q = np.array(run.terms.q)
-        self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])
+        self.q = np.array(run.terms.q)  # (n, nq) the present postures
+        self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])  # (n,) which of them overlap
         self._at_first = max(1, int(self.bad.sum()))
+        # keys: frames that were predicted and are free, and evaluation points; they do not change again
         self.keys: set[int] = set()
-        self.stuck: set[int] = set()
+        self.stuck: set[int] = set()  # frames whose prediction failed
 
     def free(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
         """Free the evaluation points and both ends, then all between; `whole`: also after a frame that is stuck."""

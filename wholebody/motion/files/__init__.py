@@ -68,7 +68,6 @@ def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
 
 
 def _ending(path: Path, known: Collection[str], done: str) -> str:
-    """The ending of a file's name, one of some."""
     ending = path.suffix.lower()
     if ending == ".fbx" and done == "read":
         raise FileFormatError(f"{one_line(path.name)}: {FBX}")

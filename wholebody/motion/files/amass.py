@@ -19,8 +19,7 @@ from wholebody.motion.clip import LARGEST, MOST_FRAMES
 from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 
-BODY = 22
-"""Joints whose poses every version has; SMPL's two hands are joints only there."""
+BODY = 22  # joints whose poses every version has; SMPL's two hands are joints only there
 
 TEMPLATE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """From the template's axes into those of a body that faces x: z forward to x, x left to y, y up to z."""

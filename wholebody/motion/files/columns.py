@@ -30,10 +30,8 @@ UNIT = re.compile(r"\s*[\[(](deg|degrees|°|rad|radians)[\])]$|[\s_](deg|degrees
 def write(motion: Motion, path: Path, *, bare: bool = False) -> Path:
     """Write time, the seven values of a free root, and the joints in radians; turns without limits are angles.
 
-    `bare` leaves out the line of names and the times, as Unitree's LAFAN1 files are.
-
-    Raises:
-        InputError: a joint has several degrees of freedom, or the file cannot be written.
+    `bare` leaves out the line of names and the times, as Unitree's LAFAN1 files are. InputError for a joint of several
+    degrees of freedom.
     """
     figure, q = motion.figure, motion.q
     if len(figure.joint_values(figure.neutral)) != len(figure.joints):
@@ -240,8 +238,7 @@ def _time_step(path: Path, time: Array, places: list[int], decimals: int) -> flo
     dt = float(time[-1] - time[0]) / (len(time) - 1)
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
-    # a step may differ by a thousandth, and by what rounding both of its times makes
-    steps = np.diff(time)
+    steps = np.diff(time)  # a step may differ by a thousandth, and by what rounding both of its times makes
     late = np.flatnonzero(np.abs(steps - np.median(steps)) > 1e-3 * dt + min(1.001 * 10.0**-decimals, 0.4 * dt))
     if len(late):
         place = places[int(late[0]) + 1]

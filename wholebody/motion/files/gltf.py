@@ -24,8 +24,7 @@ from wholebody.geometry.placement import steady
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 
-JOINT = "joint "
-"""Before the name of a joint, in the name of its node."""
+JOINT = "joint "  # before the name of a joint, in the name of its node
 
 UPWARD: Array = np.eye(4)
 UPWARD[:3, :3] = UP["y"].T
@@ -36,11 +35,7 @@ SKIN = (0.84, 0.74, 0.65, 1.0)  # the colour of pieces that have none
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as an animation: y up, z forward, metres, one keyframe a frame, interpolated linearly.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write a clip as an animation: y up, z forward, metres, one keyframe a frame, interpolated linearly."""
     figure = motion.figure
     if len(motion.q) * figure.model.njoints > 20_000_000:  # keyframes, about 600 MB
         raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")

@@ -102,10 +102,7 @@ def _sampled(keys: Array, values: Array, sampler: dict[str, Any], times: Array, 
 
 
 def skeleton_of(animated: Animated, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
-    """The skeleton of the skin with most joints, or, without a skin, of the nodes that are animated.
-
-    Units and axes as for `wholebody.motion.reading.read_skeleton`.
-    """
+    """The skeleton of the skin with most joints, or of the animated nodes; units and axes as for `read_skeleton`."""
     if animated.dt > 0.1:
         animated = Animated(animated.document.path, 0.1)
     return animated.document.decoded(lambda: _skeleton(animated, unit, up))

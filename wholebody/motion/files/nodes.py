@@ -36,11 +36,9 @@ def angles_about(turned: Rotation, axes: Array) -> Array:
     return found
 
 
-SAME_PLACE = 1e-9
-"""Metres between joints that are at one place."""
+SAME_PLACE = 1e-9  # metres between joints that are at one place
 
-OFF = 1e-4
-"""Metres and radians by which a skeleton may differ from a figure and still be the figure's own."""
+OFF = 1e-4  # metres and radians by which a skeleton may differ from a figure and still be the figure's own
 
 
 @dataclass(frozen=True)
@@ -62,10 +60,7 @@ class Node:
 
 
 def nodes_of(figure: Figure) -> list[Node]:
-    """The nodes of a figure, parents before children; a figure whose joints slide has none.
-
-    Those of figures that were joined hang on a node "world".
-    """
+    """The nodes of a figure, parents first; none where joints slide. Joined figures hang on a node "world"."""
     model = figure.model
     data = model.createData()
     columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)
@@ -185,8 +180,7 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
     # of two solutions within the limits the one nearer to the neutral posture
     resting = np.array([figure.joint_values(figure.neutral)[figure.model.names[joint]] for joint in node.joints])
     best = (beyond + 1e-3 * np.abs(choices - resting).sum(axis=2)).argmin(axis=0)
-    chosen: Array = choices[best, np.arange(len(turns))]
-    return chosen
+    return np.asarray(choices[best, np.arange(len(turns))])
 
 
 def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
@@ -201,8 +195,7 @@ def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
 
 def wrapped(angles: Array) -> Array:
     """Angles between minus and plus half a turn, radians."""
-    found: Array = (angles + np.pi) % (2.0 * np.pi) - np.pi
-    return found
+    return np.asarray((angles + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _segment(figure: Figure, joint: int) -> str:

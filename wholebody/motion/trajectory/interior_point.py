@@ -28,10 +28,7 @@ LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one
 
 
 class BandedQP(NamedTuple):
-    """A program; P (n, n) is symmetric and positive definite, with both triangles; G (m, n); both are sparse.
-
-    `start` (n,) is where the iteration begins; None for the middle between bounds.
-    """
+    """A program with sparse P (n, n), positive definite, and G (m, n); `start` (n,) or the middle between bounds."""
 
     P: Any
     c: Array

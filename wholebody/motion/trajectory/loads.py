@@ -18,9 +18,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, between
 from wholebody.motion.clip_torques import CUTOFF, bearing, smoothed
-from wholebody.motion.frame_terms import FrameTerms, between
+from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.inverse_dynamics import (
     FRICTION,
     LIGHT,
@@ -36,28 +36,20 @@ from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
 from wholebody.scene.scene import Scene
 
-LENGTH = 0.1
-"""Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
+LENGTH = 0.1  # metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support
 
 TOLERATED = 5e-4
 """Metres, see `LENGTH`: what a frame whose postures are free may be beyond its bounds without being changed."""
 
-NEAR = 0.05
-"""Metres: a load that is farther from its bound has no row; what passes unseen has one in the next step."""
+NEAR = 0.05  # metres: a load that is farther from its bound has no row; what passes unseen has one in the next step
 
 
 class Defects(NamedTuple):
-    """By how much loads that `wb.motion.torques` measures are more than those of the rows; see `ClipLoads.corrected`.
+    """By how much measured loads (`wb.motion.torques`) are more than those of the rows; see `ClipLoads.corrected`."""
 
-    Attributes:
-        torque: (n, nv) N m.
-        place: (n, 2) of the zero moment point, metres.
-        pressed: (n,) whether the measurement says where the zero moment point is; see `LIGHT`.
-    """
-
-    torque: Array
-    place: Array
-    pressed: Mask
+    torque: Array  # (n, nv) N m
+    place: Array  # (n, 2) of the zero moment point, metres
+    pressed: Mask  # (n,) whether the measurement says where the zero moment point is; see `LIGHT`
 
 
 class LoadBounds(NamedTuple):
@@ -309,5 +301,4 @@ def standing_frames(places: Array, feet: Array) -> Indices:
     # A foot stands between frames if it stands in both: of two it is the one with fewer feet, or the nearer.
     near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
     fewer = np.where(feet[below] < feet[above], below, above)
-    found: Indices = np.where(feet[below] == feet[above], near, fewer)
-    return found
+    return np.asarray(np.where(feet[below] == feet[above], near, fewer))

@@ -13,9 +13,9 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Range
 from wholebody.motion.avoider import MethodResult, Run
-from wholebody.motion.clip import Clip
+from wholebody.motion.clip import Clip, between
 from wholebody.motion.faults import Faults
-from wholebody.motion.frame_terms import FrameTerms, between
+from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
@@ -158,10 +158,7 @@ class Trajectory(Checked):
 def _in_parts(
     run: Run, windows: ClipRun, window: Window, reference: Array, faults: Faults, report: Callable[[float], bool]
 ) -> WindowResult:
-    """A window freed part by part, each from where the one before it is; with that one where a part is not freed.
-
-    What is missed by little stays, for the repair; where nothing comes before, all is freed at once.
-    """
+    """A window freed part by part, each from the one before, or with it where it is not freed."""
     length, shared = run.frames(LONG, 2), run.frames(LONG / 4.0, 1)
     q, firsts, end, missed = np.array(reference), [window.first], window.first, list[str]()  # of each part
 

@@ -65,13 +65,10 @@ class Rows(NamedTuple):
 
     @property
     def asked(self) -> Array:
-        """(r,) what programs ask of each row: room of a missed one, of another no less of it than it has.
-
-        Soles that rest sink a little between frames. Room of them too would bend the whole body at every frame.
-        """
+        """(r,) what programs ask of each row: room of a missed one, of another no less of it than it has."""
+        # soles sink a little between frames; room of them too would bend the whole body
         room, least = self.node.room, -MET if self.node.share else 0.0
-        asked: Array = np.where(self.gap < least, room, np.minimum(self.gap, room))
-        return asked
+        return np.asarray(np.where(self.gap < least, room, np.minimum(self.gap, room)))
 
     @property
     def shortfalls(self) -> Array:

@@ -25,16 +25,11 @@ ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; th
 
 
 class Limits(NamedTuple):
-    """What every deviation keeps to.
+    """What every deviation keeps to."""
 
-    Attributes:
-        lower, upper: (n, nv) limits of joints, and of frozen ones; infinite where there is none.
-        slowest, fastest: (n - 1, nv) bounds on the change of the deviation from a frame to the next.
-    """
-
-    lower: Array
+    lower: Array  # and upper: (n, nv) limits of joints, and of frozen ones; infinite where there is none
     upper: Array
-    slowest: Array
+    slowest: Array  # and fastest: (n - 1, nv) bounds on the change of the deviation from a frame to the next
     fastest: Array
 
     @classmethod
@@ -42,10 +37,7 @@ class Limits(NamedTuple):
         cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None,
         begun: Array | None = None,
     ) -> Limits:  # fmt: skip
-        """Those of a chart of a clip's frames from `first` on; at a seam nothing moves from what is begun with (n, nv).
-
-        `seams` say whether the clip goes on before and after them, `rate` is the factor of speed limits, None for none.
-        """
+        """Those of a chart from frame `first` on, begun with (n, nv); `seams` as ends, `rate` of speed limits."""
         count, nv = len(chart), chart.model.nv
         lower, upper = np.full((count, nv), -np.inf), np.full((count, nv), np.inf)
         slowest, fastest = lower[1:].copy(), upper[1:].copy()
@@ -173,8 +165,7 @@ def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:
     reach = np.zeros(len(one.gap))
     for part in one.parts:
         reach += np.abs(part[:, dofs]).sum(axis=1)
-    found: Mask = (one.gap < one.node.room + radius * reach) & (reach > 0.0)
-    return found
+    return np.asarray((one.gap < one.node.room + radius * reach) & (reach > 0.0))
 
 
 def likely(one: Rows, radius: float) -> Mask:
@@ -270,5 +261,4 @@ def _brought_back(x: Array, past: Array, radius: float) -> Array:
     # It can shift all later frames, or reduce every deviation by a share.
     shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
     shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
-    found: Array = np.maximum(shifted, shrunk)
-    return found
+    return np.asarray(np.maximum(shifted, shrunk))

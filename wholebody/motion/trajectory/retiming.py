@@ -58,8 +58,7 @@ def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = Non
         sp.csr_matrix(P), c, sp.csr_matrix(G), lower, np.full(len(lower), np.inf), low, high
     )  # fmt: skip
     z = minimise(program).z[:count]
-    found: Array = 1.0 - np.clip(z, low[:count], high[:count])
-    return found
+    return np.asarray(1.0 - np.clip(z, low[:count], high[:count]))
 
 
 def _rate(count: int, dt: float) -> sp.csr_matrix:
@@ -81,8 +80,7 @@ def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:
         ratio = np.where(steps != 0.0, bound / steps, np.inf)
     rate = np.maximum(ratio, 0.0).min(axis=1, initial=np.inf) ** 2
     # Between two frames b is linear, so the rate is largest at one of them.
-    most: Array = np.minimum(np.concatenate([rate, [np.inf]]), np.concatenate([[np.inf], rate]))
-    return most
+    return np.asarray(np.minimum(np.concatenate([rate, [np.inf]]), np.concatenate([[np.inf], rate])))
 
 
 class Timing(NamedTuple):
@@ -104,10 +102,7 @@ def timing(b: Array, dt: float) -> Timing | None:
 
 
 def passed(b: Array, step: float) -> tuple[Array, float]:
-    """Places s (m,) from 0 to n - 1 at equal times, of squares of the rate ds/dt at whole s (n,), linear in between.
-
-    Times are `step` apart, or less for the last one to be at the end: also returns step / this difference.
-    """
+    """Places (m,) in n frames at equal times, of squared rates (n,), and step / their difference."""
     rate = np.sqrt(b)
     begun = np.concatenate([[0.0], np.cumsum(2.0 / (rate[:-1] + rate[1:]))])
     count = max(1, int(np.ceil(begun[-1] / step - 1e-9)))

@@ -114,8 +114,7 @@ class _Filter:
         self._little = self._little + 1 if left and small else 0
         if left and longest < 0.9 * self.radius:
             self.penalty = min(10.0 * self.penalty, SETTINGS.highest)
-        # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
-        if self._little >= 2:
+        if self._little >= 2:  # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
             self.radius = 0.5 * min(self.radius, longest)
         elif longest > 0.9 * self.radius and not self._little:
             self.radius = min(2.0 * self.radius, self._largest)
@@ -155,10 +154,7 @@ class WindowProgram:
         self, x: Array, cancel: Cancel, radius: float | None = None, largest: float | None = None,
         early: bool = False,
     ) -> SQPResult:  # fmt: skip
-        """Iterate from deviations x (n, nv), in trust regions from `radius` to `largest`.
-
-        `early` ends where much is missed after ten steps, as there are other beginnings.
-        """
+        """Iterate from x (n, nv) in trust regions; `early` ends where ten steps leave much missed."""
         here, filter_, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         counts, smallest = self._counts(here), 0.5 * filter_.radius

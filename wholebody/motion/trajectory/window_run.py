@@ -107,8 +107,7 @@ class _Window(NamedTuple):
     def deviations(self, q: Array) -> Array:
         """(n, nv) deviations of postures (n, nq), within limits."""
         x = np.array([self.chart.deviation(frame, posture) for frame, posture in enumerate(q)])
-        found: Array = np.clip(x, self.limits.lower, self.limits.upper)
-        return found
+        return np.asarray(np.clip(x, self.limits.lower, self.limits.upper))
 
 
 class ClipRun:
@@ -118,10 +117,7 @@ class ClipRun:
         self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
         loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
-        """Take postures (n, nq) that deviations are from, and what a push spreads over [s] or None, by its jerk.
-
-        `rate` is the factor of speed limits, None for none; `near` the trust region of windows with given postures.
-        """
+        """Take postures (n, nq), the spread of a push [s] or None, the `rate` of speeds, a trust region `near`."""
         self._run, self._reference = run, reference
         self._time, self._rate, self._loads, self._near = time, rate, loads, near
 
@@ -129,11 +125,8 @@ class ClipRun:
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None,
         around: Array | None = None, whole: bool = True, patient: bool = True,
     ) -> WindowResult:  # fmt: skip
-        """Free one window; a `cancel` that says so leaves it as it was.
-
-        `begun` (n, nq) has postures to begin with, `around` those that stay beyond the window, the originals if
-        None; with `whole` false the last frame of a part is free. What ended early goes on only if `patient`.
-        """
+        """Free one window, from `begun` (n, nq), among postures `around` beyond it; a `cancel` leaves it as it was."""
+        # with `whole` false the last frame of a part is free; what ended early goes on only if `patient`
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
@@ -222,10 +215,7 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends.
-
-        A part that goes on from another one is followed from its first posture before all.
-        """
+        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         movable, goes_on = bool((own.limits.lower < own.limits.upper).any()), self._goes_on(own)
         if movable and goes_on:  # others are seldom on the side of things that it is on

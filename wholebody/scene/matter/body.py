@@ -32,11 +32,7 @@ from wholebody.geometry.shapes import (
 
 
 class Surface(NamedTuple):
-    """What happens where two materials touch.
-
-    The restitution is the speed of separation as a share of the speed of approach, the friction the greatest tangential
-    force as a share of the normal one (Coulomb).
-    """
+    """What happens where two materials touch: restitution (share of the speed of approach), and Coulomb's friction."""
 
     restitution: float
     friction: float
@@ -102,8 +98,7 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
 )
 """The materials of table 1."""
 
-DEFAULT = MATERIALS["wood"]
-"""Of things that say nothing of theirs."""
+DEFAULT = MATERIALS["wood"]  # of things that say nothing of theirs
 
 
 def material(value: object, what: str) -> Material:

@@ -21,8 +21,7 @@ from wholebody.solution import Solution, TraceEntry
 Budget = tuple[float, "int | None"]
 """Tolerance [m, rad], and the most iterations, or None for the method's own default, or FEASIBILITY_ONLY."""
 
-FEASIBILITY_ONLY = -1
-"""In place of a count of iterations: the first feasible posture, whatever its measures are."""
+FEASIBILITY_ONLY = -1  # in place of a count of iterations: the first feasible posture, whatever its measures are
 
 LADDER: tuple[Budget, ...] = tuple((tol, None) for tol in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
 """Tolerances from cheap to exact; each adapter begins and ends where it makes sense for it."""

@@ -63,8 +63,7 @@ class _Plant:
         self._addresses: list[tuple[str, Any]] = []
         for index in range(1, self._model.njoints):
             self._add_joint(index)
-        # drake's distances of hulls and ellipsoids are exact to about 2e-5 m.
-        self.least = problem.clearance + 2e-5
+        self.least = problem.clearance + 2e-5  # drake's distances of hulls and ellipsoids are exact to about 2e-5 m
         self._pieces: dict[tuple[int, float], Any] = {}
         pairs = self._paired(problem)
         self.plant.Finalize()

@@ -23,23 +23,16 @@ from wholebody.problem import Problem
 
 
 class Chain:
-    """The chain of a frame.
+    """The chain of a frame."""
 
-    Attributes:
-        model: Pinocchio's.
-        joints: in the model, from the base on.
-        places: (n,) of their values in a posture.
-        end: placement of the frame in the last joint.
-        solver: what a tool made of it; None before.
-    """
-
-    solver: Any = None
+    solver: Any = None  # what a tool made of it; None before
 
     def __init__(self, model: pin.Model, frame: int) -> None:
-        self.model = model
-        self.joints = list(model.supports[model.frames[frame].parentJoint])[1:]
+        self.model = model  # Pinocchio's
+        self.joints = list(model.supports[model.frames[frame].parentJoint])[1:]  # in the model, from the base on
+        # places: (n,) of their values in a posture
         self.places = np.array([model.joints[joint].idx_q for joint in self.joints])
-        self.end = model.frames[frame].placement
+        self.end = model.frames[frame].placement  # placement of the frame in the last joint
 
     @contextmanager
     def written(self) -> Iterator[tuple[Path, str, str]]:

@@ -143,7 +143,6 @@ def _apart(figure: wb.Figure) -> frozenset[tuple[str, str]]:
 
 @lru_cache(maxsize=4)
 def _kept(figure: wb.Figure, built: SceneGeometry) -> Indices:
-    """Numbers of the pairs of a scene but for those."""
     apart = _apart(figure)
     return np.array([number for number, pair in enumerate(_named(built)) if pair not in apart], dtype=np.intp)
 

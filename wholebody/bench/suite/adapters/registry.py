@@ -50,11 +50,8 @@ class _Row(NamedTuple):
 
 
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
-    """The adapters of these names, in order; where None, one of each algorithm that is installed.
-
-    "newton" means all of the method, "all" every method, "module:Class" one's own. Methods that differ from another in
-    their starts alone are among several only if `starts`.
-    """
+    """The adapters of these names ("all", "newton" for several, "module:Class"); None: of each algorithm installed."""
+    # methods that differ from another in their starts alone are among several only if `starts`
     rows = _rows()
     if names is None:
         listed = _texts()["taking_part"]

@@ -76,8 +76,7 @@ class Settings(Checked):
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
         unused = FEASIBILITY_ONLY if moving else 0
         listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
-        # A case whose goals move is hundreds of solves.
-        most = min(self.levels, 3) if moving else self.levels
+        most = min(self.levels, 3) if moving else self.levels  # a case whose goals move is hundreds of solves
         if len(listed) <= most:
             return listed
         first = [level for level in listed if level[1] == FEASIBILITY_ONLY]

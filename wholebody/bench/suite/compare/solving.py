@@ -292,11 +292,7 @@ _local = threading.local()
 
 @dataclass(frozen=True)
 class Task:
-    """What a chunk of work is: methods, each with its further budgets, on one case.
-
-    A solve is ended after `cap` seconds of the processor; a sweep that is expected to take more than `most` seconds is
-    left out.
-    """
+    """Methods with further budgets on a case; seconds of a solve, `cap`, and of a sweep, `most`."""
 
     family: ProblemSet
     number: int

@@ -174,11 +174,9 @@ def material(
     return Material(settings, chunks, results, summaries(results, chunks, settings.cap), facts, missing)
 
 
-OURS = "qp"
-"""Our default method; "qp/..." is the same method with other settings for its programs."""
+OURS = "qp"  # our default method; "qp/..." is the same method with other settings for its programs
 
-Figures = Mapping[tuple[str, int], float]
-"""One positive figure a problem, by the name of its set and its number."""
+Figures = Mapping[tuple[str, int], float]  # one positive figure a problem, by the name of its set and its number
 
 
 def best(found: Mapping[str, Figures]) -> tuple[str, ...]:

@@ -23,8 +23,7 @@ from wholebody.figures.postures import placed
 from wholebody.tasks.grasp import FINGERS
 
 given = numbers("hands")
-Taken = tuple[Array, wb.Shape, pin.SE3]
-"""A posture (nq,) of a hand, and what it takes where."""
+Taken = tuple[Array, wb.Shape, pin.SE3]  # a posture (nq,) of a hand, and what it takes where
 
 
 @lru_cache(maxsize=1)

@@ -256,11 +256,8 @@ def drag(number: int, rng: np.random.Generator) -> Posed:
 
 
 def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
-    """Postures (frames + 1, nq) of a smooth motion from standing, at rest at both ends, each one free.
-
-    A uniform cubic B-spline (de Boor 1978, "A Practical Guide to Splines") whose control postures are random; a span
-    depends on four of them, so a new one is tried until the span that it ends is free.
-    """
+    """Postures (frames + 1, nq) of a smooth free motion from standing, at rest at both ends."""
+    # a uniform cubic B-spline (de Boor 1978) through random controls, the last of a span is drawn until it is free
     standing = figure.posture("standing")
     spans = int(rng.integers(of_drag.spans[0], of_drag.spans[1] + 1))
     for _ in range(50):

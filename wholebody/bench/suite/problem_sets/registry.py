@@ -65,8 +65,7 @@ def beside(say: Callable[[str], object]) -> tuple[str, ...]:
     return (*names, *dict.fromkeys(TUNED_ON[name] for name in names))
 
 
-CASES = 200
-"""Problems of a set, if nothing else is asked for."""
+CASES = 200  # problems of a set, if nothing else is asked for
 
 
 def problem_set(name: str) -> ProblemSet:

@@ -144,10 +144,7 @@ class Axis(NamedTuple):
 
 
 def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, Array]:
-    """An arm with links of random lengths, and its ready posture (nq,): elbow bent, tool in front.
-
-    `kind`: "seven axes" as a person's arm; "industrial", the last three of six crossing; "parallel", three parallel.
-    """
+    """An arm ("seven axes", "industrial" or "parallel") with links of random lengths, and its ready posture (nq,)."""
     lengths = [round(float(length), 3) for length in rng.uniform(*of_arm.lengths_m)]
     lower, upper, fore, hand = lengths
     beside = round(float(rng.uniform(*of_arm.beside_m)), 3) if kind == "industrial" else 0.0

@@ -17,8 +17,7 @@ from wholebody.figures.urdf.writing import exact
 from wholebody.geometry.pieces import hull_triangles, swept_points
 from wholebody.geometry.placement import placement
 
-Make = Callable[[int, np.random.Generator], tuple[str, wb.Shape]]
-"""Makes the thing of a number: its kind and its shape."""
+Make = Callable[[int, np.random.Generator], tuple[str, wb.Shape]]  # makes the thing of a number: its kind and its shape
 
 
 def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3, exact: bool = False) -> float:
@@ -62,11 +61,7 @@ def hull_obj(hull: Any) -> str:
 
 
 class Occupied:
-    """The space that a figure takes up in some postures.
-
-    `places` (pin.SE3) and `centres` (n, 3) are those of all pieces in the first posture, then in the second, and so on;
-    then of balls. `count`: pieces of the figure.
-    """
+    """What a figure's `count` pieces fill in some postures, then balls: `places` (SE3), `centres` (n, 3)."""
 
     def __init__(self, figure: wb.Figure, postures: Iterable[Array]) -> None:
         """Place the figure's pieces at each posture (nq,)."""

@@ -23,8 +23,7 @@ from wholebody.figures.loading import one_figure
 from wholebody.figures.urdf.writing import add_joint, add_model_joint, exact, urdf_axis
 from wholebody.geometry.flesh import settled
 
-Meshes = dict[str, str]
-"""Text of OBJ files by their path below the folder of an export."""
+Meshes = dict[str, str]  # text of OBJ files by their path below the folder of an export
 
 
 def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:

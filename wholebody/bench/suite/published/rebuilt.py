@@ -130,11 +130,7 @@ class Body:
 
 
 class Rebuilt:
-    """A problem as its files state it: a posture has `model.nq` numbers, in the order of the files.
-
-    `moving`: whether an answer is a posture for each frame; `free`: whether it begins with the root's place and
-    quaternion.
-    """
+    """A problem as its files state it; `moving`: an answer has a posture a frame, `free`: with the root's place."""
 
     def __init__(self, folder: Path, name: str) -> None:
         """Read a problem, such as "clutter/0007"; FileFormatError where a file is wrong."""

@@ -13,9 +13,10 @@ import pinocchio as pin
 from wholebody.assessment.motion import velocities
 from wholebody.assessment.posture import Assessment, assess
 from wholebody.base.arrays import Array
+from wholebody.base.batches import run_batch
 from wholebody.base.compiled import compile_all
 from wholebody.base.errors import WholebodyError
-from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs, tell
+from wholebody.base.runner import EndedError, Job, allow_processor, tell
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.catalogue import NOTHING, Answer, HardCase, Nonsense, Posed, Stream, cases
 from wholebody.problem import Problem
@@ -126,16 +127,13 @@ def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = 2
     """Cases as they end, each by a method, in `jobs` processes; over `cap` s of the processor a method hangs."""
     # Half an hour for the first case of a process, which may compile everything.
     left = (Job((case, adapter.name), _cell, (case, adapter, cap), 1800.0) for case, adapter in asked)
-    children = [Child(ONE_THREAD) for _ in range(jobs)]
-    for outcome in run_jobs(lambda: next(left, None), children):
+    for outcome in run_batch(left, jobs):
         case, method = outcome.job.name
         answer = outcome.notes[0] if outcome.notes else Answer(NOTHING)
         if outcome.error is not None:
             failure = "its answer cannot be judged" if outcome.notes else _failure(outcome.error, cap)
             answer = Answer(NOTHING, failure=failure)
         yield Cell(case, method, answer, outcome.answer or Judged())
-    for child in children:
-        child.close()
 
 
 @cache
@@ -183,9 +181,8 @@ def ask(case: HardCase, adapter: Adapter, alive: Callable[[], None] = lambda: No
 
 def _posed(question: Posed, adapter: Adapter) -> Answer:
     solution = adapter.make(ASKED, question.iterations).solve(question.problem)
-    left = max(solution.assessment.goal_error, solution.assessment.goal_angle)
     return Answer(
-        np.array(solution.q, dtype=float)[None], str(solution.status), (float(left),),
+        np.array(solution.q, dtype=float)[None], str(solution.status), (float(_left(solution.assessment)),),
         seconds=solution.seconds, message=solution.message,
     )  # fmt: skip
 

@@ -48,10 +48,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Stream:
-    """A goal to follow frame by frame with `wb.tracking.Drag`; every frame counts, and the motion from one to the next.
-
-    The first goal, a `Point`, is the one that moves; no joint may move faster than `speed` [rad/s].
-    """
+    """A first goal, a `Point`, to follow by `wb.tracking.Drag`, no joint faster than `speed` [rad/s]."""
 
     problem: Problem
     frames: tuple[Frame, ...]
