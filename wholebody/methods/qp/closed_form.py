@@ -7,6 +7,7 @@ Universal Robots); or the same from the end to the base. Of seven joints one is 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
 from typing import Any, NamedTuple
@@ -32,11 +33,26 @@ class Branches(NamedTuple):
     effort: Array  # (k,) of each; inf where it does not exist or is beyond limits
     least: Array  # (m, n) those that take less effort than the samples beside them, the least first
 
-    def cheaper(self, most: float) -> Array:
-        """Those (j, n) within limits whose effort is less than `most`, the least first."""
-        order = self.effort.argsort()
-        found: Array = self.values[order[self.effort[order] < most]]
-        return found
+    def downhill(self, held: int) -> Iterator[tuple[Array, float, float]]:
+        """Each posture (n,) within limits, the value of the held joint to which its branch falls, the effort there.
+
+        That is the sample beside it of less effort; the vertex of a parabola where there is none. The least is first.
+        """
+        own, at = self.effort.reshape(-1, BRANCHES), self.values[:, held].reshape(-1, BRANCHES)
+        ahead = np.full((len(own) + 2, BRANCHES), np.inf)
+        ahead[1:-1] = own
+        before, after = ahead[:-2], ahead[2:]
+        lower = np.minimum(before, after)
+        beside = np.where(before < after, np.roll(at, 1, axis=0), np.roll(at, -1, axis=0))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            step, bent = 0.5 * (np.roll(at, -1, axis=0) - np.roll(at, 1, axis=0)), before - 2.0 * own + after
+            vertex, least = at + 0.5 * step * (before - after) / bent, own - 0.125 * (after - before) ** 2 / bent
+        falls, bends = lower < own, (bent > 0.0) & (bent < np.inf)
+        towards = np.where(falls, beside, np.where(bends, vertex, at)).ravel()
+        effort = np.where(falls, lower, np.where(bends, least, own)).ravel()
+        effort[np.isinf(self.effort)] = np.inf
+        for k in effort.argsort()[: np.count_nonzero(effort < np.inf)].tolist():
+            yield self.values[k], towards[k], effort[k]
 
 
 def closed_form(chain: Chain, alike: float = ALIKE) -> Arm | None:
