@@ -159,10 +159,11 @@ class Descents:
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
                 return self._nearest() if self._is_out_of_reach() else None
-            if (met is not None and met.blocked is None) or finite or self.control.over:
+            unsettled = met is not None and self.measured and not met.stationary  # as limits are near
+            if (met is not None and met.blocked is None and not unsettled) or finite or self.control.over:
                 return met
             # What blocks an end may leave postures of its branch free.
-            most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
+            most = np.inf if met is None else (1.0 if unsettled else SEEDS.worth) * self._effort(met.q)
             along = self._along_branches(branches or self._branches(), most) if held else None
             if along is not None:
                 q = self.chain.posture(along.values, self.asked.at)
@@ -198,10 +199,18 @@ class Descents:
             if effort >= most:
                 break
             # it is only near to the goals, or was a little beyond limits and clamped to them
-            here = self._along(values, values[self.chain.held])
+            own = values[self.chain.held]
+            here = self._along(values, own)
+            if here is None:
+                here = self._along(values, 0.5 * (own + towards))
             if here is None or here.gap < 0.0:
                 continue
-            here = self._to_the_edge(here, towards) if measured else here
+            if measured:
+                if towards == own:  # the least effort of the branch is at one of its blocked ends
+                    least = here.values[None].copy()
+                    self._descended(least, how_far(self.settings, 1, others=True))
+                    towards = least[0, self.chain.held]
+                here = self._to_the_edge(here, towards)
             if here.effort < most:
                 best, most = here, here.effort
         return best

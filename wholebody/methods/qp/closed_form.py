@@ -36,19 +36,19 @@ class Branches(NamedTuple):
     def downhill(self, held: int) -> Iterator[tuple[Array, float, float]]:
         """Each posture (n,) within limits, the value of the held joint to which its branch falls, the effort there.
 
-        That is the sample beside it of less effort; the vertex of a parabola where there is none. The least is first.
+        That is the sample beside it of less effort; else one beyond limits, and the effort of a parabola or the own.
         """
         own, at = self.effort.reshape(-1, BRANCHES), self.values[:, held].reshape(-1, BRANCHES)
         ahead = np.full((len(own) + 2, BRANCHES), np.inf)
         ahead[1:-1] = own
         before, after = ahead[:-2], ahead[2:]
         lower = np.minimum(before, after)
-        beside = np.where(before < after, np.roll(at, 1, axis=0), np.roll(at, -1, axis=0))
         with np.errstate(invalid="ignore", divide="ignore"):
-            step, bent = 0.5 * (np.roll(at, -1, axis=0) - np.roll(at, 1, axis=0)), before - 2.0 * own + after
-            vertex, least = at + 0.5 * step * (before - after) / bent, own - 0.125 * (after - before) ** 2 / bent
+            step, bent = np.nanmedian(np.diff(at, axis=0)), before - 2.0 * own + after
+            least = own - 0.125 * (after - before) ** 2 / bent
         falls, bends = lower < own, (bent > 0.0) & (bent < np.inf)
-        towards = np.where(falls, beside, np.where(bends, vertex, at)).ravel()
+        back = np.where(falls, before < after, np.isinf(before))
+        towards = np.where(bends & ~falls, at, at + np.where(back, -step, step)).ravel()
         effort = np.where(falls, lower, np.where(bends, least, own)).ravel()
         effort[np.isinf(self.effort)] = np.inf
         for k in effort.argsort()[: np.count_nonzero(effort < np.inf)].tolist():
