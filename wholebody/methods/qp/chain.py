@@ -15,6 +15,7 @@ from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
+from wholebody.methods.qp.along_branches import Along
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain, rows_of
@@ -122,14 +123,6 @@ def closed_form_postures(problem: Problem) -> tuple[Array, bool]:
         return found, chain.arm is not None and chain.held < 0
 
 
-class Along(NamedTuple):
-    """A posture along a branch of the closed form."""
-
-    values: Array  # (n,) of the joints
-    effort: float
-    gap: float  # m: least distance of a pair beyond its clearance
-
-
 class Descents:
     """Descents of one problem from one batch of seeds after the other."""
 
@@ -164,9 +157,8 @@ class Descents:
                 return met
             # What blocks an end may leave postures of its branch free.
             most = np.inf if met is None else (1.0 if unsettled else SEEDS.worth) * self._effort(met.q)
-            along = self._along_branches(branches or self._branches(), most) if held else None
-            if along is not None:
-                q = self.chain.posture(along.values, self.asked.at)
+            q = self._along_branches(branches or self._branches(), most) if held else None
+            if q is not None:
                 return Met(q, tuple(self.trace), self.measured or not self.settings.measures)
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
@@ -192,63 +184,6 @@ class Descents:
                 self.asked = with_values(self.asked, nearest=self.asked.nearest * [[1.0], [0.0]])
         return None
 
-    def _along_branches(self, branches: Branches, most: float) -> Along | None:
-        """The free posture of less effort than `most`, and than any other along the branches; None where none is."""
-        best, measured = None, bool(self.asked.nearest[1].any())
-        for values, towards, effort in branches.downhill(self.chain.held):
-            if effort >= most:
-                break
-            # it is only near to the goals, or was a little beyond limits and clamped to them
-            own = values[self.chain.held]
-            here = self._along(values, own)
-            if here is None:
-                here = self._along(values, 0.5 * (own + towards))
-            if here is None or here.gap < 0.0:
-                continue
-            if measured:
-                if towards == own:  # the least effort of the branch is at one of its blocked ends
-                    least = here.values[None].copy()
-                    self._descended(least, how_far(self.settings, 1, others=True))
-                    towards = least[0, self.chain.held]
-                here = self._to_the_edge(here, towards)
-            if here.effort < most:
-                best, most = here, here.effort
-        return best
-
-    def _to_the_edge(self, free: Along, end: float) -> Along:
-        """From a free posture on towards a value of the held joint, to where a clearance is only just kept.
-
-        Regula falsi on the least gap (M. Dowell, P. Jarratt, "A modified regula falsi", BIT 11, 1971).
-        """
-        begin, near, far = free.values[self.chain.held], (0.0, free.gap), (1.0, np.nan)
-        for count in range(SEEDS.closer):
-            bent = near[1] / (near[1] - far[1]) if far[1] < 0.0 else 0.5
-            share = near[0] + (far[0] - near[0]) * min(max(bent, 0.05), 0.95) if count else 1.0
-            here = self._along(free.values, begin + share * (end - begin))
-            if here is not None and here.gap >= 0.0:
-                free = here if here.effort < free.effort else free
-                far = far[0], 0.5 * far[1]
-                near = share, here.gap
-                if share == 1.0 or here.gap <= SEEDS.edge:
-                    break
-            else:
-                near = near[0], 0.5 * near[1] if count else near[1]
-                far = share, np.nan if here is None else here.gap
-        return free
-
-    def _along(self, values: Array, held: float) -> Along | None:
-        """The posture of a branch near values (n,) with one of the held joint; None where there is none."""
-        values = values.copy()
-        values[self.chain.held] = held
-        found = self.chain.beside(self.asked.goals, self.asked.nearest, values, how_far(self.settings, 1))
-        if found is None:
-            return None
-        near = self.workspace.near_views(self.chain.posture(found, self.asked.at), self.within + SEEDS.ahead)
-        gaps = near.distance - self.asked.clearances[near.number]
-        away = found - self.asked.nearest[0]
-        effort = float(self.asked.nearest[1].dot(away * away))
-        return Along(found, effort, float(np.minimum.reduce(gaps, initial=SEEDS.ahead)))
-
     def _or_from_random(self, met: Met | None) -> Met | None:
         """An end, or one of less effort from the first random seeds."""
         seeds = next(self.chain.seeds(self.start, self.settings.seed, self.rule.together))
@@ -256,6 +191,13 @@ class Descents:
         if met is None or (other is not None and self._effort(other.q) < self._effort(met.q)):
             return other
         return with_values(met, trace=tuple(self.trace))
+
+    def _along_branches(self, branches: Branches, most: float) -> Array | None:
+        """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
+        goals, at, nearest, clearances = self.asked
+        asked = how_far(self.settings, 1, others=True)
+        found = Along(self.chain, goals, at, nearest, clearances, self.workspace, asked).least(branches, most)
+        return None if found is None else self.chain.posture(found.values, at)
 
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
@@ -371,7 +313,7 @@ class Rule(NamedTuple):
         held = guided and chain.held >= 0
         finite = guided and not held and chain.arm is not None
         enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
-        nearly = guided and chain.first > 0 and measured
+        nearly = guided and chain.arm is None and measured
         return cls(guided, held, finite, enough, rows_of(goals), SEEDS.together * more, measured, nearly)
 
 

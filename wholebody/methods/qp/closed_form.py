@@ -36,7 +36,7 @@ class Branches(NamedTuple):
     def downhill(self, held: int) -> Iterator[tuple[Array, float, float]]:
         """Each posture (n,) within limits, the value of the held joint to which its branch falls, the effort there.
 
-        That is the sample beside it of less effort; else one beyond limits, and the effort of a parabola or the own.
+        That is the sample beside it of less effort; else its own, and a parabola's least; else one beyond limits.
         """
         own, at = self.effort.reshape(-1, BRANCHES), self.values[:, held].reshape(-1, BRANCHES)
         ahead = np.full((len(own) + 2, BRANCHES), np.inf)
@@ -46,13 +46,16 @@ class Branches(NamedTuple):
         with np.errstate(invalid="ignore", divide="ignore"):
             step, bent = np.nanmedian(np.diff(at, axis=0)), before - 2.0 * own + after
             least = own - 0.125 * (after - before) ** 2 / bent
+            beyond = own - 3.0 * (np.where(np.isinf(before), after, before) - own)  # it falls faster towards limits
         falls, bends = lower < own, (bent > 0.0) & (bent < np.inf)
         back = np.where(falls, before < after, np.isinf(before))
         towards = np.where(bends & ~falls, at, at + np.where(back, -step, step)).ravel()
-        effort = np.where(falls, lower, np.where(bends, least, own)).ravel()
+        effort = np.where(falls, lower, np.where(bends, least, beyond)).ravel()
         effort[np.isinf(self.effort)] = np.inf
         for k in effort.argsort()[: np.count_nonzero(effort < np.inf)].tolist():
             yield self.values[k], towards[k], effort[k]
+            if effort[k] == -np.inf:  # alone: the branch falls to either side
+                yield self.values[k], 2.0 * self.values[k, held] - towards[k], effort[k]
 
 
 def closed_form(chain: Chain, alike: float = ALIKE) -> Arm | None:

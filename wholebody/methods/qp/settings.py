@@ -106,6 +106,7 @@ class SeedNumbers(NamedTuple):
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
     ahead: float = 0.05  # m: least gap of a posture along a branch that counts as this. Less: edges take more looks.
     edge: float = 3e-6  # m: gap at which such a posture is at the edge of what is free. Less: less effort, more looks.
+    gain: float = 1e-4  # share of the effort that another look at an edge is worth. Less: less effort, more looks.
     closer: int = 16  # most looks at postures on the way to one edge
     near: int = 3  # ends near goals that no posture meets from which the nearest is sought. More: nearer, more time.
     differing: float = 0.1  # rad or m by which these differ
