@@ -57,7 +57,8 @@ def branches(figure: wb.Figure, frame: str, placement: pin.SE3, at: np.ndarray) 
     goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), dtype=np.int64))
     near = chain.angles(at)
     found = chain.branches(goals, np.array([near, np.zeros_like(near)]))
-    return np.array([chain.posture(values, at) for values in found.cheaper(np.inf)]).reshape(-1, model.nq)
+    order = found.effort.argsort()[: np.count_nonzero(found.effort < np.inf)]
+    return np.array([chain.posture(values, at) for values in found.values[order]]).reshape(-1, model.nq)
 
 
 def angles_of(chain: PlainChain, goal: np.ndarray, held: np.ndarray | None = None) -> np.ndarray:

@@ -15,6 +15,7 @@ from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
+from wholebody.methods.qp.along_branches import Along
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain, rows_of
@@ -151,15 +152,14 @@ class Descents:
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
                 return self._nearest() if self._is_out_of_reach() else None
-            if (met is not None and met.blocked is None) or finite or self.control.over:
+            unsettled = met is not None and self.measured and not met.stationary  # as limits are near
+            if (met is not None and met.blocked is None and not unsettled) or finite or self.control.over:
                 return met
             # What blocks an end may leave postures of its branch free.
-            most = np.inf if met is None else SEEDS.worth * self._effort(met.q)
-            for each in (branches or self._branches()).cheaper(most) if held else ():
-                # it is only near to the goals, or was a little beyond limits and clamped to them
-                values = self.chain.beside(self.asked.goals, self.asked.nearest, each, how_far(self.settings, 1))
-                if values is not None and self._is_free(q := self.chain.posture(values, self.asked.at)):
-                    return Met(q, tuple(self.trace), not self.settings.measures)
+            most = np.inf if met is None else (1.0 if unsettled else SEEDS.worth) * self._effort(met.q)
+            q = self._along_branches(branches or self._branches(), most) if held else None
+            if q is not None:
+                return Met(q, tuple(self.trace), self.measured or not self.settings.measures)
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
                 return met if self.chain.arm is None else with_values(met, blocked=None)
@@ -191,6 +191,13 @@ class Descents:
         if met is None or (other is not None and self._effort(other.q) < self._effort(met.q)):
             return other
         return with_values(met, trace=tuple(self.trace))
+
+    def _along_branches(self, branches: Branches, most: float) -> Array | None:
+        """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
+        goals, at, nearest, clearances = self.asked
+        asked = how_far(self.settings, 1, others=True)
+        found = Along(self.chain, goals, at, nearest, clearances, self.workspace, asked).least(branches, most)
+        return None if found is None else self.chain.posture(found.values, at)
 
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
@@ -306,7 +313,7 @@ class Rule(NamedTuple):
         held = guided and chain.held >= 0
         finite = guided and not held and chain.arm is not None
         enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
-        nearly = guided and chain.first > 0 and measured
+        nearly = guided and chain.arm is None and measured
         return cls(guided, held, finite, enough, rows_of(goals), SEEDS.together * more, measured, nearly)
 
 

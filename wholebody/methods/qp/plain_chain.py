@@ -73,7 +73,7 @@ class PlainChain:
         self.guide = self.arm or closed_form(self.chain, NEARLY)
         self.held = -1 if self.guide is None or self.guide.held < 0 else int(self.guide.joints[self.guide.held])
         self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
-        self.first = int(self.arm is None and self.guide is not None)  # it lacks postures of an arm that is stretched
+        self.first = int(self.held >= 0 or (self.arm is None and self.guide is not None))
 
     def angles(self, q: Array) -> Array:
         """Values (..., n) of the joints at postures (..., nq); may be a view of these."""

@@ -104,6 +104,10 @@ class SeedNumbers(NamedTuple):
     samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
     finer: int = 96  # the same where no posture of these is within limits. More: random seeds are tried less often.
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
+    ahead: float = 0.05  # m: least gap of a posture along a branch that counts as this. Less: edges take more looks.
+    edge: float = 3e-6  # m: gap at which such a posture is at the edge of what is free. Less: less effort, more looks.
+    gain: float = 1e-4  # share of the effort that another look at an edge is worth. Less: less effort, more looks.
+    closer: int = 16  # most looks at postures on the way to one edge
     near: int = 3  # ends near goals that no posture meets from which the nearest is sought. More: nearer, more time.
     differing: float = 0.1  # rad or m by which these differ
     deep: float = 5e-3  # m: of a posture inside of a thing that no tolerance of the goals leads out of
