@@ -27,9 +27,9 @@ def in_cone(wedges: Array, x: float, y: float, z: float) -> bool:
         wedge = wedges[k]
         before = wedge[0] * x + wedge[1] * y + wedge[2] * z
         if before >= 0.0 > wedge[3] * x + wedge[4] * y + wedge[5] * z:
-            return wedge[6] * x + wedge[7] * y + wedge[8] * z >= 0.0
+            return bool(wedge[6] * x + wedge[7] * y + wedge[8] * z >= 0.0)
     wedge = wedges[0]
-    return wedge[6] * x + wedge[7] * y + wedge[8] * z >= 0.0
+    return bool(wedge[6] * x + wedge[7] * y + wedge[8] * z >= 0.0)
 
 
 @compiled(inner=True)
