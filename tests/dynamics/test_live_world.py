@@ -69,9 +69,13 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
     for _ in range(12):  # 0.2 s without a word
         live.move()
     assert live.place("left_palm") == pytest.approx(places[-1], abs=0.01)
+    assert "eases back" not in live.report().status
     for _ in range(60):
         live.move()
     assert live.place("left_palm") == pytest.approx(began, abs=0.02)
+    assert "no place of left_palm arrives any more; it eases back" in live.report().status
+    live.follow({"left_palm": began})
+    assert "eases back" not in live.report().status
     with pytest.raises(wb.UnknownNameError, match="left_palm"):
         live.follow({"left_pal": began})
     with pytest.raises(wb.InputError, match="place of left_palm"):

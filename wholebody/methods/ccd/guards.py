@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, ReachCone, TwistRange
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, floats, rotated, seen_from, three
+from wholebody.methods.ccd.guards_kernel import compiled_kernel
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, rotated, three
 from wholebody.methods.ccd.sweep import Aims
 
 
@@ -28,23 +28,19 @@ NOTHING_FIXED = Kept()
 
 
 class Polygon:
-    """A reach cone: the test of a direction, on plain floats, and the nearest direction inside."""
+    """A reach cone: the test of a direction, and the nearest direction inside.
+
+    Attributes:
+        wedges: (k, 9) normals of the two sides of each wedge, and of its edge.
+    """
 
     def __init__(self, cone: ReachCone) -> None:
         self._cone, slices = cone, np.cross(cone.visible, cone.vertices)
-        self._wedges = [
-            (three(slice_), three(after), three(edge))
-            for slice_, after, edge in zip(slices, np.roll(slices, -1, axis=0), cone.boundaries, strict=True)
-        ]
+        self.wedges = np.ascontiguousarray(np.hstack([slices, np.roll(slices, -1, axis=0), cone.boundaries]))
 
     def contains(self, direction: Vector) -> bool:
-        """Whether a unit direction is inside: find the wedge that contains it, then test the wedge's edge."""
-        x, y, z = direction
-        for (a, b, c), (d, e, f), (g, h, i) in self._wedges:
-            if a * x + b * y + c * z >= 0.0 > d * x + e * y + f * z:
-                return g * x + h * y + i * z >= 0.0
-        g, h, i = self._wedges[0][2]
-        return g * x + h * y + i * z >= 0.0
+        """Whether a unit direction is inside."""
+        return bool(compiled_kernel().in_cone(self.wedges, *direction))
 
     def nearest(self, direction: Vector) -> Vector:
         """The nearest direction inside to a unit direction outside, a little inside of the edge."""
@@ -159,24 +155,29 @@ class LimbGuard:
     """Keeps the direction or the turn of a limb in a reference frame; `nodes` are those that turn it there."""
 
     def __init__(self, figure: Figure, limbs: Limbs, limb: str, reference: str) -> None:
-        self._limbs = limbs
+        self._limbs, self._kernel = limbs, compiled_kernel()
         self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (limb, reference))
+        self._ends = self._limb.node, self._base.node
         self.nodes = limbs.between(self._base.node, self._limb.node)
+        self._turns()
 
     def read(self, q: Array, data: Any) -> None:
         """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
         self._limb.read(data)
         self._base.read(data)
+        self._turns()
+
+    def _turns(self) -> None:
+        """Note the rotations (9,) of both frames in their nodes."""
+        self._own, self._turn = (np.array(frame.placement[:9]) for frame in (self._limb, self._base))
 
 
 class TwistGuard(LimbGuard):
     """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
+        self._part, self._slope = part, np.array(part.slope @ part.center)
         super().__init__(figure, limbs, part.limb, part.reference)
-        self._part = part
-        self._center = floats(pin.SE3(part.center, np.zeros(3)))
-        self._slope: list[float] = (part.slope @ part.center).tolist()
 
     def inside(self) -> bool:
         """Whether the twist is within its bound, after `limbs.forward`."""
@@ -190,15 +191,18 @@ class TwistGuard(LimbGuard):
         local = [rotated(limb.placement, *axis) for axis in AXES]
         Aims(self._limbs, [limb.node] * 3, local, targets, [False] * 3).sweep_until(self.nodes, self.inside)
 
+    def _turns(self) -> None:
+        super()._turns()
+        self._turn = (self._turn.reshape(3, 3) @ self._part.center).ravel()  # the central rotation
+
     def _excess(self) -> float:
         """The twist beyond its bound, radians; negative inside."""
-        (a, b, _), (d, e, _), z = (self._seen(*axis) for axis in AXES)
-        along = sum(w * part for w, part in zip(self._slope, z, strict=True))
-        return float(self._part.sign * atan2(b - d, a + e) - self._part.bound - along)
-
-    def _seen(self, x: float, y: float, z: float) -> Vector:
-        """A direction of the limb in the axes of the central rotation."""
-        return seen_from(self._center, *self._base.seen(*self._limb.direction(x, y, z)))
+        part = self._part
+        return float(
+            self._kernel.twist_beyond(
+                self._limbs.frames, *self._ends, self._own, self._turn, self._slope, part.sign, part.bound
+            )
+        )
 
 
 RangeGuard = CoupledGuard | EllipticGuard | TwistGuard
@@ -213,8 +217,12 @@ class ConeGuard(LimbGuard):
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
         cone = figure.cones[name]
-        super().__init__(figure, limbs, cone.limb, cone.reference)
         self._polygon, self._axis = Polygon(cone.cone), np.asarray(cone.axis, dtype=float)
+        super().__init__(figure, limbs, cone.limb, cone.reference)
+
+    def _turns(self) -> None:
+        super()._turns()
+        self._local = self._own.reshape(3, 3) @ self._axis  # the axis in the node's frame
 
     def holds(self, data: Any) -> bool:
         """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
@@ -222,7 +230,8 @@ class ConeGuard(LimbGuard):
 
     def inside(self) -> bool:
         """Whether the limb is in its cone, after `limbs.forward`."""
-        return self._polygon.contains(self._base.seen(*self._limb.direction(*self._axis)))
+        frames = self._limbs.frames
+        return bool(self._kernel.limb_in_cone(self._polygon.wedges, frames, *self._ends, self._local, self._turn))
 
     def turn_back(self) -> None:
         """Turn the joints of the limb to the nearest direction of its cone, and call `limbs.forward`."""

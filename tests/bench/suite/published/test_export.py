@@ -202,6 +202,6 @@ def check(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str) 
 
 
 def test_scenes_of_several_figures_are_refused_before_anything_is_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="two_figures: its scenes have several figures.*leave it out"):
+    with pytest.raises(InputError, match=r"two_figures: its scenes have several figures.*leave it out"):
         export([problem_set("two_figures")], 1, 0, tmp_path / "out")
     assert not (tmp_path / "out").exists()
