@@ -139,10 +139,8 @@ class SceneGeometry:
             return self.moves
 
     def _note_moved(self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]]) -> None:
-        for name, pieces in self.pieces_of.items():
-            if not pieces or self._moved_at[pieces[0][0]] <= seen:
-                continue
-            index, local = pieces[0]
+        for name in dict.fromkeys(self.owners[piece] for piece in np.flatnonzero(self._moved_at > seen).tolist()):
+            index, local = self.pieces_of[name][0]
             before, after = (
                 model.geometryObjects[index].placement * local.inverse()
                 for model in (proximity.geometry, self.geometry)
