@@ -66,7 +66,7 @@ class MovingScene:
         self.table = PairTable(self.model, self.geometry, pairs, built.table.swept)
 
     def refresh(self, geometry: pin.GeometryModel | None = None, pieces: Iterable[int] | None = None) -> None:
-        """Put things that stay, all or those of some pieces, to where a geometry model has them, by default the scene's."""
+        """Put things that stay, all or those of some pieces, to where a geometry model has them; None: the scene's."""
         given = self.built.geometry if geometry is None else geometry
         with self.built.lock:
             for index in self._still if pieces is None else self._still.intersection(pieces):
