@@ -129,7 +129,7 @@ def test_near_pairs_of_two_figures_among_many_things_are_those_that_coal_finds()
     assert len(begin) == len(second) + 1
     geometry, data = scene.geometry, scene.model.createData()
     rest = scene.figure.posture(scene.figure.postures[0])
-    last, passed = None, 0
+    last, before, passed, met = None, rest, 0, 0
     with scene.borrow() as workspace:
         for shift in (0.0, 0.4, 50.0, 1.0, 1.01, 2.0):
             q = pin.integrate(scene.model, rest, np.concatenate([[shift, 0, 0], np.zeros(scene.model.nv - 3)]))
@@ -151,8 +151,15 @@ def test_near_pairs_of_two_figures_among_many_things_are_those_that_coal_finds()
                 moved = far_moved(scene.pair_table, last, here)
                 assert np.array_equal(moved, reference.far_moved(scene.pair_table, last, here))
                 passed += len(moved)
-            last = here
+                every = workspace.sweep.first_contact(before, q, np.arange(len(wanted)))
+                found_first = workspace.sweep.first_contact(before, q)
+                assert (found_first is None) == (every is None)
+                if found_first is not None and every is not None:
+                    assert (found_first.index, found_first.fraction) == (every.index, every.fraction)
+                    met += 1
+            last, before = here, q
     assert passed > 100
+    assert met >= 2
 
 
 def test_solves_without_pair_data_are_free_and_repeatable(no_pair_data: None) -> None:

@@ -63,7 +63,11 @@ def test_a_torus_is_covered_and_its_hole_stays_open(torus: tuple[trimesh.Trimesh
             60.0,
             "CoACD cannot cut it into convex pieces; repair the mesh",
         ),
-        (lambda *_: all(True for _ in count()), 0.3, "CoACD found no convex pieces in 0.3 s of the processor; repair"),
+        (
+            lambda *_: all(True for _ in count()),
+            0.3,
+            r"CoACD found no convex pieces of 96 triangles in 0.3 s of the processor; give fewer triangles, ",
+        ),
     ],
     ids=["crashes", "hangs"],
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -139,3 +141,32 @@ def test_a_sweep_in_which_both_sides_move_is_that_of_fine_subdivision() -> None:
         assert there[found.index] <= level[found.index] + 0.51e-4
         hits += 1
     assert 4 <= hits <= 12
+
+
+def test_a_frame_sees_where_things_were_put_between_the_frames_of_others(scene: wb.Scene) -> None:
+    """By one workspace, of which the sets that move take turns, and by a copy of the scene that has seen no frame."""
+    workspace, q = scene.workspace(), scene.figure.posture("standing")
+    there = pin.integrate(scene.model, q, np.concatenate([[0.8, 0.0, 0.0], np.zeros(scene.model.nv - 3)]))
+    scene.move("board", at=(5.0, 0.0, 1.0))
+    met = list[str | None]()
+    for number, (mover, put, at) in enumerate(
+        [
+            ("stone", "lamp", (0.6, 0.0, 1.1)),
+            ("board", "lamp", (5.0, 3.0, 1.1)),
+            ("stone", "board", (0.7, 0.0, 1.0)),
+            ("lamp", "board", (6.0, 0.0, 1.0)),
+            ("stone", "lamp", (0.5, 0.0, 1.1)),
+            ("board", "lamp", (0.9, 0.1, 1.1)),
+        ]
+    ):
+        scene.move(put, at=at)
+        scene.move(mover, at=(5.0, -3.0 - number, 1.0), over=0.1)
+        workspace.refresh()
+        way = workspace.where(mover)
+        found = workspace.frame({mover: (way, way)}).first_contact(q, there, 1e-4)
+        expected = copy.copy(scene).sweep(q, there, moves={mover: (way, way)})
+        assert (found is None) == (expected is None)
+        if found is not None and expected is not None:
+            assert found.fraction == pytest.approx(expected.fraction, abs=1e-9)
+        met.append(None if found is None else workspace.owners[found.pair[1]])
+    assert met == ["lamp", None, "board", None, "lamp", "lamp"]

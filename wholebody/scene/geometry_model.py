@@ -134,15 +134,17 @@ class SceneGeometry:
         with self.lock:
             if moved is not None:
                 self._note_moved(proximity, seen, moved)
-            for index in np.flatnonzero(self._moved_at > seen).tolist():
+            for index in self.moved_since(seen).tolist():
                 proximity.place_piece(index, self.geometry.geometryObjects[index].placement)
             return self.moves
 
+    def moved_since(self, seen: int) -> Indices:
+        """Pieces (k,) of things that were placed after so many moves."""
+        return np.flatnonzero(self._moved_at > seen)
+
     def _note_moved(self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]]) -> None:
-        for name, pieces in self.pieces_of.items():
-            if not pieces or self._moved_at[pieces[0][0]] <= seen:
-                continue
-            index, local = pieces[0]
+        for name in dict.fromkeys(self.owners[piece] for piece in self.moved_since(seen).tolist()):
+            index, local = self.pieces_of[name][0]
             before, after = (
                 model.geometryObjects[index].placement * local.inverse()
                 for model in (proximity.geometry, self.geometry)

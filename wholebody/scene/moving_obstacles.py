@@ -56,7 +56,7 @@ class MovingScene:
             self.geometry = built.geometry.copy()
         self.centres = {name: self._centre(name) for name in self.names}
         self.joints = {name: self._add_joints(name) for name in self.names}
-        self._still = [k for name, pieces in built.pieces_of.items() if name not in self.joints for k, _ in pieces]
+        self._still = {k for name, pieces in built.pieces_of.items() if name not in self.joints for k, _ in pieces}
         pairs = built.table.pairs
         if between_things:
             between = self._pairs_of_things()
@@ -64,11 +64,11 @@ class MovingScene:
             pairs = np.concatenate([pairs, between])
         self.table = PairTable(self.model, self.geometry, pairs, built.table.swept)
 
-    def refresh(self, geometry: pin.GeometryModel | None = None) -> None:
-        """Put the things that stay to where a geometry model has them, by default the scene's."""
+    def refresh(self, geometry: pin.GeometryModel | None = None, pieces: Iterable[int] | None = None) -> None:
+        """Put things that stay, all or those of some pieces, to where a geometry model has them; None: the scene's."""
         given = self.built.geometry if geometry is None else geometry
         with self.built.lock:
-            for index in self._still:
+            for index in self._still if pieces is None else self._still.intersection(pieces):
                 self.geometry.geometryObjects[index].placement = given.geometryObjects[index].placement
 
     def configuration(self, q: Array, placements: Mapping[str, pin.SE3]) -> Array:

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from wholebody.scene.moving_obstacles import BothSides, Collision, FrameMotion
 
 
+SETS = 16  # sets of things that move for which sweeps are kept; more = more memory, 50 MB each among 5,000 things
+
+
 class NotCopyable:
     """What belongs to the run that made it: to pickle or to copy it is an InputError."""
 
@@ -68,7 +71,8 @@ class Workspace(NotCopyable):
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
         self._depths: dict[float, SweptDepth] = {}
-        self._moving: dict[tuple[str, ...], BothSides] = {}
+        self._moving: dict[tuple[str, ...], tuple[BothSides, int]] = {}  # and the number of changes that it has seen
+        self._changes, self._changed_at = 0, np.zeros(len(built.owners), dtype=np.intp)  # when a piece was placed
         self._seen = built.update_placements(self.proximity, -1)
 
     def begin(self) -> None:
@@ -80,13 +84,18 @@ class Workspace(NotCopyable):
 
     def refresh(self) -> None:
         """See things where they are now; `moved` has those that moved there."""
-        self._seen = self._built.update_placements(self.proximity, self._seen, self.moved)
+        before, self._seen = self._seen, self._built.update_placements(self.proximity, self._seen, self.moved)
+        if before != self._seen:
+            self._changes += 1
+            self._changed_at[self._built.moved_since(before)] = self._changes
 
     def place(self, placements: Mapping[str, pin.SE3]) -> None:
         """See things at placements in their joints' frames; the scene keeps its own."""
+        self._changes += 1
         for name, base in placements.items():
             for index, local in self._built.pieces_of[name]:
                 self.proximity.place_piece(index, base * local)
+                self._changed_at[index] = self._changes
 
     def where(self, name: str) -> pin.SE3:
         """Where this run sees a thing, in its joint's frame."""
@@ -118,11 +127,14 @@ class Workspace(NotCopyable):
         """A frame in which these things move, from one placement to another in the frame of their joint."""
         from wholebody.scene.moving_obstacles import BothSides, FrameMotion, MovingScene
 
-        both = self._moving.get(tuple(moved))
+        names = tuple(moved)
+        both, seen = self._moving.pop(names, (None, -1))
         if both is None:
-            scene = MovingScene(self._built, moved, between_things=False)
-            both = self._moving[tuple(moved)] = BothSides(scene)
-        both.scene.refresh(self.geometry)
+            both = BothSides(MovingScene(self._built, moved, between_things=False))
+            if len(self._moving) >= SETS:
+                del self._moving[next(iter(self._moving))]  # of what moved longest ago
+        self._moving[names] = both, self._changes
+        both.scene.refresh(self.geometry, np.flatnonzero(self._changed_at > seen).tolist())
         return FrameMotion(both, moved)
 
     @property

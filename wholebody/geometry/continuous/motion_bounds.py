@@ -113,6 +113,27 @@ class MotionBounds:
         return np.asarray(against[row[first], joint[second]] + against[row[second], joint[first]])
 
 
+def meeting_blocks(table: PairTable, centers: Array, speed: Array) -> Indices:
+    """Numbers (k,) of the pairs without those blocks whose bodies cannot come to what stands; see `pair_blocks`.
+
+    Origins of pieces are at `centers` (n, 3), and no point of a piece goes farther than `speed` (n,) metres.
+    """
+    begin, second, body, first, members = table.blocks
+    if not len(second):
+        return np.arange(len(table.pairs))
+    middle, radius = np.zeros((len(first) - 1, 3)), np.zeros(len(first) - 1)
+    for number in range(len(radius)):
+        own = members[first[number] : first[number + 1]]
+        middle[number] = centers[own].mean(axis=0)
+        out = np.linalg.norm(centers[own] - middle[number], axis=1) + table.reach[own] + speed[own]
+        radius[number] = out.max()
+    meet = second < 0
+    beside = np.flatnonzero(~meet)
+    away = np.linalg.norm(centers[second[beside]] - middle[body[beside]], axis=1) - table.reach[second[beside]]
+    meet[beside] = away < radius[body[beside]]
+    return np.flatnonzero(np.repeat(meet, np.diff(begin)))
+
+
 def pair_kinds(table: PairTable) -> tuple[Indices, Indices]:
     """A pair (k, 2) for each kind, and the kind of every pair (pairs,): to what stands one piece comes alike."""
     count = len(table.joint)

@@ -20,7 +20,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.errors import InputError
-from wholebody.geometry.continuous.motion_bounds import MotionBounds
+from wholebody.geometry.continuous.motion_bounds import MotionBounds, meeting_blocks
 from wholebody.geometry.continuous.swept_depth import compiled_kernel, shapes_of
 from wholebody.geometry.pair_distances import PairDistances
 from wholebody.geometry.proximity import PairTable
@@ -101,14 +101,16 @@ class Sweep:
         q0, q1 = self._checked(q0, "start"), self._checked(q1, "end")
         if not (np.isfinite(tolerance) and tolerance >= 1e-5):
             raise InputError(f"sweep: tolerance is {tolerance!r}; give at least 1e-5 m, ten times coal's own accuracy")
-        index = np.arange(len(self._pairs)) if numbers is None else numbers
-        if not len(index):
+        if not len(self._pairs if numbers is None else numbers):
             return None
         self._distances.reset()  # the same motion has the same answer, whatever was swept before
         velocity = np.asarray(pin.difference(self.model, q0, q1))
         self._place(q0, velocity)
         centers = self._distances.placed[:, 3].copy()
         self._bounds.update(self._data, velocity, centers)
+        index = numbers
+        if index is None:
+            index = meeting_blocks(self._table, centers, self._bounds.speed.sum(axis=1))
         speed = self._bounds.approach(self._pairs[index, 0], self._pairs[index, 1])
         between = centers[self._pairs[index, 0]] - centers[self._pairs[index, 1]]
         near = np.sqrt(np.einsum("ij,ij->i", between, between)) < self._reach[index] + speed
