@@ -232,7 +232,10 @@ class Fitter:
         if far <= NEAR:
             return found
         if far <= FAR:
-            return self.step(q, goals, most=most, midway=midway, within=FARTHER) if self.depth(found) > DEEP else found
+            if self.depth(found) <= DEEP:
+                return found
+            again = self.step(q, goals, most=most, midway=midway, within=FARTHER)
+            return min(found, again, key=lambda each: self._merit(each, goals))
         before, bounds = self._merit(q, goals), (-np.inf, np.inf) if most is None else most
         for _ in range(4):
             if self._merit(found, goals) <= before:
