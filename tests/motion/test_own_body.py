@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import coal
 import numpy as np
@@ -10,8 +11,11 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.motion.test_ground import flat, walker
 from tests.motion.test_retargeting import person
 from tests.motion.test_things import robot, with_hands
+from wholebody.motion.holds import Holds
+from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.skeleton import SkeletonMotion
 
 STARTS = {
@@ -166,3 +170,23 @@ def test_hands_that_meet_in_the_recording_meet(stature: float | None, tmp_path: 
     assert np.ptp(clip.q[:, :3], axis=0).max() < 5e-3  # who stands still in the recording does so
     alone = hand_distance(wb.retarget(motion, figure, ground=None), "wrist_yaw" if stature is None else "hand")
     assert np.abs(alone).min() > 2e-3
+
+
+def test_what_cannot_be_reached_is_known_after_the_first_pass(
+    human: wb.Figure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second time around costs a part of the first one."""
+    motion, _ = walker(flat, 1.5)
+    step, steps = Fitter.step, list[object]()
+
+    def counted(self: Fitter, *given: Any, **named: Any) -> np.ndarray:
+        steps.append(given)
+        return step(self, *given, **named)
+
+    monkeypatch.setattr(Fitter, "step", counted)
+    wb.retarget(motion, human)
+    once, gone = len(steps), [True, False]
+    monkeypatch.setattr(Holds, "give_up", lambda self: gone.pop(0))
+    wb.retarget(motion, human)
+    assert not gone
+    assert once < len(steps) - once < 1.4 * once

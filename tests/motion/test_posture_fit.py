@@ -49,7 +49,7 @@ def test_a_step_does_not_end_inside_what_was_far_away_when_it_began(tmp_path: Pa
     scene = wb.Scene(figure).add(wb.Box((0.1, 0.1, 0.1)), name="block", at=(0.45, 0.1, 0.0))
     layout = Layout([], [], np.zeros((0, 0)), np.zeros(0), np.zeros(0), [HeldPoint("left_wrist", "", 1, TIP)])
     goals = Goals(
-        np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array([[0.485, 0.12, 0.0]]), np.full((1, 3), 10.0),
+        np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array([[0.485, 0.12, 0.0]]), np.full((1, 3), 0.3),
         figure.neutral, np.zeros(1),
     )  # fmt: skip
     with scene.borrow() as workspace:

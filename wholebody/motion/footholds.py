@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.motion.windows import Window, long_runs, runs
+from wholebody.motion.windows import Window, long_runs, normal, runs
 
 NEARBY = 0.8  # m: ground farther away than a step says nothing of the height here
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
@@ -70,8 +69,10 @@ def _noise(places: Array, dt: float) -> tuple[Array, float]:
     """(n,) speeds of a point (n, 3) without noise, and the noise: the median speed of it where the point is slow."""
     if len(places) < 2:
         return np.zeros(len(places)), 0.0
-    raw = np.gradient(places, dt, axis=0)
-    smooth = np.gradient(gaussian_filter1d(places, SMOOTH / dt, axis=0, mode="nearest"), dt, axis=0)
+    weights = normal(SMOOTH, dt)
+    beyond = np.pad(places, ((len(weights) // 2,) * 2, (0, 0)), mode="edge")
+    means = np.stack([np.convolve(column, weights, "valid") for column in beyond.T], axis=1)
+    raw, smooth = np.gradient(places, dt, axis=0), np.gradient(means, dt, axis=0)
     speed = np.linalg.norm(smooth, axis=1)
     near = speed < TELLING
     return speed, float(np.median(np.linalg.norm((raw - smooth)[near], axis=1))) if near.any() else 0.0

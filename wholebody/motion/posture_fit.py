@@ -33,7 +33,7 @@ CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, 
 DAMPING = 1e-4  # m²/rad² of every joint, so that the program has one answer
 WITHIN, FARTHER = 0.01, 0.2  # m: nearer pairs have rows; the same of steps that go far
 CLEARANCE = 5e-4  # m: distance that pairs keep
-NEAR, DEEP = 0.05, 5e-3  # rad, m: change of a value by a step that may meet other pairs; an overlap that tells it did
+NEAR, DEEP = 0.05, 1e-2  # rad, m: change of a value by a step that may meet other pairs; an overlap that tells it did
 FAR, SHORTER = 0.5, 0.3  # rad, m: change of a value by a step that is looked at; share of it that the next try may take
 PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
@@ -229,7 +229,10 @@ class Fitter:
         if far <= NEAR:
             return found
         if far <= FAR:
-            return self.step(q, goals, most=most, midway=midway, within=FARTHER) if self.depth(found) > DEEP else found
+            if self.depth(found) <= DEEP:
+                return found
+            again = self.step(q, goals, most=most, midway=midway, within=FARTHER)
+            return min(found, again, key=lambda each: self._merit(each, goals))
         before, bounds = self._merit(q, goals), (-np.inf, np.inf) if most is None else most
         for _ in range(4):
             if self._merit(found, goals) <= before:

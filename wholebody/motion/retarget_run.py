@@ -140,7 +140,7 @@ class Run:
         """Take the goals of the next frame; the postures (nq,) that are known now, in their order."""
         self._wanted[self._came] = wanted
         self._came += 1
-        return self._advanced()
+        return self._advanced(self._came)
 
     def led_by(self, frames: list[Wanted]) -> None:
         """Know frames before they come: fitted backward in time too, these may have better postures."""
@@ -150,21 +150,34 @@ class Run:
             following = self._fitted(k, following and following[0], (len(frames) - 1 - k) % self.every == 0)
             self._backward[k] = following
 
+    def pass_first(self, frames: list[Wanted]) -> None:
+        """Take all frames at once, and do the first pass over them: then it is known what they cannot reach."""
+        assert self.holds is not None
+        self._wanted, self._came, self.ended = dict(enumerate(frames)), len(frames), True
+        self.holds.finish(self._came)
+        self._advanced(len(frames), 2)  # the free fit is known
+
+    def advance(self, until: int) -> list[Array]:
+        """The postures (nq,) that come out when all stages after the first pass know its frames `until` one."""
+        self.ended = until >= self._came
+        return self._advanced(until)
+
     def finish(self) -> list[Array]:
         """The postures (nq,) of the last frames."""
         self.ended = True
         if self.holds is not None:
             self.holds.finish(self._came)
-        return self._advanced()
+        return self._advanced(self._came)
 
-    def _advanced(self) -> list[Array]:
-        """Let every stage do the frames whose later ones have come."""
-        given, come = self._done[-1], self._came
-        for number, (stage, wait) in enumerate(self._stages):
+    def _advanced(self, come: int, stages: int | None = None) -> list[Array]:
+        """Let every stage, or the first ones, do the frames whose later ones have come."""
+        given = self._done[-1]
+        for number, (stage, wait) in enumerate(self._stages[:stages]):
             for frame in range(self._done[number], come if self.ended else come - wait):
                 stage(frame)
                 self._done[number] = frame + 1
-            come = self._done[number]
+            come = min(come, self._done[number])
+        come = self._done[-1]
         found = [self._found[frame] for frame in range(given, come)]
         known: tuple[dict[int, Any], ...] = (
             self._wanted, self._chain, self._slow, self._even, self._free, self._paths, self._first, self._found,

@@ -145,11 +145,17 @@ def retarget(
             points = held_points(figure, roles, held) + touching_points(figure, roles, motion, parts, joints)
             touched = Touched(figure, Things(world, tracks), contacts)
             holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
+            # places on things are sought as bodies come to them; a hand on the own body is known after a first pass
+            ahead = all(one.base for one in contacts)
             for _ in range(2):  # the second time around what the first one could not reach
                 run = Run(figure, wanted, roles, motion.dt, holds, workspace, alone.free)
-                q = _postures(run, frames, progress, 0.3)
+                if ahead:
+                    run.pass_first(frames)
+                else:
+                    q = _postures(run, frames, progress, 0.3)
                 if not holds.give_up():
                     break
+            q = _advanced(run, len(frames), progress) if ahead else q
             lost = holds.let_go(q)
             inside = _said_inside(alone.fitter, holds, q)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
@@ -172,6 +178,16 @@ def _postures(run: Run, frames: list[Wanted], tell: Callable[[float], object] | 
     found += run.finish()
     if tell is not None:
         tell(1.0)
+    return np.array(found)
+
+
+def _advanced(run: Run, count: int, tell: Callable[[float], object] | None) -> Array:
+    """Postures (n, nq) of all frames after the first pass; tells how much is done, from 0.4 on."""
+    found = list[Array]()
+    for until in (*range(20, count, 20), count):
+        found += run.advance(until)
+        if tell is not None:
+            tell(0.4 + 0.6 * until / count)
     return np.array(found)
 
 
