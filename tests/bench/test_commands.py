@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import pytest
 
+from tests.bench.bench_command import bench
 from tests.csv_rows import csv_rows
 from wholebody.bench import plot_style
 from wholebody.bench.measure.track import VARIANTS
 from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import adapters, stepping
-from wholebody.cli.bench import group
-
-
-def bench(*words: str) -> int:
-    parser = argparse.ArgumentParser()
-    group.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["bench", *words])
-    return int(arguments.run(arguments))
 
 
 @pytest.fixture

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
 import pytest
 
+from tests.bench.bench_command import bench
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.attack.judging import Case, Verdict
-from wholebody.cli.bench import group
 
-
-def bench(*words: str) -> int:
-    parser = argparse.ArgumentParser()
-    group.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["bench", "attack", *words])
-    return int(arguments.run(arguments))
+run = partial(bench, "attack")
 
 
 def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
@@ -27,7 +22,7 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     docs.mkdir()
     (docs / "where-methods-fail.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
     words = ("--cases", "12", "--kinds", "file", "--seed", "2", "--seconds", "900", "--out", str(out))
-    code = bench(*words, "--update-docs", str(docs))
+    code = run(*words, "--update-docs", str(docs))
     rows = csv_rows(out / "attack.csv")
     wrong = [row for row in rows if row["outcome"] == "wrong"]
     assert len(rows) == 12
@@ -47,17 +42,17 @@ def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.
         raise KeyboardInterrupt
 
     monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
-    assert bench("--out", str(tmp_path)) == 130
+    assert run("--out", str(tmp_path)) == 130
     rows = csv_rows(tmp_path / "attack.csv")
     assert [row["number"] for row in rows] == ["0", "1"]
 
 
 def test_what_cannot_be_asked_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="solve"):
-        bench("--kinds", "solv")
+        run("--kinds", "solv")
     with pytest.raises(InputError, match="--seconds"):
-        bench("--seconds", "nan")
+        run("--seconds", "nan")
     with pytest.raises(InputError, match="--jobs"):
-        bench("--jobs", "0")
+        run("--jobs", "0")
     with pytest.raises(InputError, match="--seed"):
-        bench("--seed", "-1")
+        run("--seed", "-1")

@@ -2,41 +2,36 @@
 
 from __future__ import annotations
 
-import argparse
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.bench.bench_command import bench
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.compare import report
 from wholebody.bench.suite.compare.lock import read_lock
 from wholebody.bench.suite.problem_sets.registry import beside
-from wholebody.cli.bench import group
 
-
-def bench(*words: str) -> int:
-    parser = argparse.ArgumentParser()
-    group.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["bench", "compare", *words])
-    return int(arguments.run(arguments))
+run = partial(bench, "compare")
 
 
 def test_two_methods_on_one_problem(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("--quick", "--cases", "1", "--sets", "robot_arm", "--methods", "qp/daqp", "dls", "--out", str(tmp_path))
-    assert bench(*words) == 0
+    assert run(*words) == 0
     assert "report.html" in capsys.readouterr().out
     assert "# cases beside each other: 1 on this machine\n" in (tmp_path / "solves.csv").read_text()
     assert {row["method"] for row in csv_rows(tmp_path / "solves.csv")} == {"qp/daqp", "dls"}
     assert "Robot arm" in (tmp_path / "report.html").read_text()
     with pytest.raises(InputError, match=r"holds a run with seeds = \[0, 1, 2\], and \[3, 4, 5\] is asked for"):
-        bench(*words, "--seed", "3")
+        run(*words, "--seed", "3")
     drawn = {chart.stem: (chart, chart) for chart in (tmp_path / "charts").glob("*.svg")}
     monkeypatch.setattr(report, "draw_all", lambda *_: drawn)  # to draw is most of the time
-    assert bench("--again", str(tmp_path / "lock.json"), "--out", str(tmp_path / "again")) == 0
+    assert run("--again", str(tmp_path / "lock.json"), "--out", str(tmp_path / "again")) == 0
     assert re.search(r"\d+ figures compared; ", capsys.readouterr().out)
     first, again = (read_lock(folder / "lock.json") for folder in (tmp_path, tmp_path / "again"))
     assert again.amounts == first.amounts
@@ -47,12 +42,12 @@ def test_two_methods_on_one_problem(
 
 def test_what_cannot_be_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="did you mean clutter"):
-        bench("--sets", "cluter", "--out", str(tmp_path / "a"))
+        run("--sets", "cluter", "--out", str(tmp_path / "a"))
     with pytest.raises(UnknownNameError, match="did you mean"):
-        bench("--methods", "qp/ospq", "--out", str(tmp_path / "b"))
+        run("--methods", "qp/ospq", "--out", str(tmp_path / "b"))
     for option in ("--jobs", "--cases"):
         with pytest.raises(InputError, match="give 1 or more"):
-            bench(option, "0", "--out", str(tmp_path / "c"))
+            run(option, "0", "--out", str(tmp_path / "c"))
     assert not list(tmp_path.iterdir())
 
 
@@ -65,4 +60,4 @@ def test_held_out_sets_stand_beside_those_of_the_same_question(monkeypatch: pyte
     )  # fmt: skip
     assert "WHOLEBODY_ROBOTS" in said[0]
     with pytest.raises(InputError, match="does not go with --held-out"):
-        bench("--held-out", "--sets", "clutter")
+        run("--held-out", "--sets", "clutter")

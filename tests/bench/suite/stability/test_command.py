@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
 import re
+from functools import partial
 from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
+from tests.bench.bench_command import bench
 from tests.csv_rows import csv_rows
 from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.bench.suite.stability.asking import Cell, ask, judge
 from wholebody.bench.suite.stability.catalogue import cases
 from wholebody.bench.suite.stability.verdict import Result, report, result
-from wholebody.cli.bench import group
 
 CASES = ("out-by-1-mm", "edge-on-edge", "not-a-number")
 METHODS = ("qp", "ccd")
-
-
-def bench(*words: str) -> int:
-    parser = argparse.ArgumentParser()
-    group.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["bench", "stability", *words])
-    return int(arguments.run(arguments))
+run = partial(bench, "stability")
 
 
 def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert bench("--methods", *METHODS, "--cases", *CASES, "--jobs", "2", "--out", str(tmp_path)) == 0
+    assert run("--methods", *METHODS, "--cases", *CASES, "--jobs", "2", "--out", str(tmp_path)) == 0
     rows = csv_rows(tmp_path / "stability.csv")
     assert [(row["case"], row["tool"]) for row in rows] == [(case, method) for case in CASES for method in METHODS]
     assert rows[0]["verdict"] == "honest"
@@ -46,7 +40,7 @@ def test_without_names_those_methods_of_the_page_are_asked_that_are_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("wholebody.cli.bench.hard_cases.installed", METHODS.__contains__)
-    assert bench("--cases", "not-a-number", "--out", str(tmp_path)) == 0
+    assert run("--cases", "not-a-number", "--out", str(tmp_path)) == 0
     rows = csv_rows(tmp_path / "stability.csv")
     assert {row["tool"] for row in rows} == {*METHODS}
 
