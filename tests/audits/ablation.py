@@ -174,9 +174,9 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp.solvers.base import WorkingSet
     from wholebody.terms import linearisation
 
-    search, descent, corrected = multistart.Multistart, sqp.SQP, WorkingSet._corrected
+    search, descent, corrected = multistart.QPMultistart, sqp.SQP, WorkingSet._corrected
 
-    def plain(self: multistart.Multistart, start: Array) -> Any:
+    def plain(self: multistart.QPMultistart, start: Array) -> Any:
         probe = self._probe(start, 0.0)
         self._minima.add(probe.violation.total, probe.converged)
         return self._descend(probe.q, "restart") if probe.violation.worst <= self.settings.tolerance else probe

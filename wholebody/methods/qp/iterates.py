@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -79,14 +78,6 @@ class Run(NamedTuple):
     solver: QPSolver  # solves the programs
     trace: list[TraceEntry]  # grows by one entry a program
     control: Control  # what may end it
-
-
-class Attempt(NamedTuple):
-    """A part of a search."""
-
-    starts: Iterable[Array]  # (nq,) postures to begin at
-    stage: Callable[[Array], LocalSolution | None]  # where it leads from one; None where that is given up
-    how: str  # what the message says of an answer that it found
 
 
 @dataclass
