@@ -166,7 +166,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     if method != "qp":
         return {}
     from wholebody.methods import starts
-    from wholebody.methods.acceleration import Anderson
     from wholebody.methods.qp import closest, feasibility, multistart, sqp
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp.feasibility import Feasibility
@@ -187,7 +186,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
 
     return {
         "watchdog": (descent, "_is_tentative", lambda self, here, there: False),
-        "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),

@@ -86,7 +86,6 @@ class DescentNumbers(NamedTuple):
     worth: float = 0.05  # share of the predicted reduction that a step must achieve. Larger: more steps rejected.
     good: float = 0.5  # share above which the next step may be longer
     poor: float = 0.25  # share below which it must be shorter
-    along: float = 3.0  # tangential parts that a step is where they grow. Larger: faster down, rejected more often.
     # rad, m: distance of a bound below which motion to it is tangential. Larger: steps to joint limits count as met
     # goals; much smaller: joints that a bound stops bend the normal part.
     room: float = 1e-3
