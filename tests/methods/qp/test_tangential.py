@@ -8,11 +8,10 @@ import pytest
 from tests.reference import active_set as reference
 from tests.reference.active_set import same
 from wholebody.base.arrays import with_values
-from wholebody.methods.qp.active_set import room_for
+from wholebody.methods.qp.active_set import Parts, parts_of, room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import DESCENT
 from wholebody.methods.qp.solvers.registry import make_solver
-from wholebody.methods.qp.tangential import Parts, parts_of
 
 NO_SHIFT = np.zeros(0)
 

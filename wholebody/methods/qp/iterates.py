@@ -13,11 +13,11 @@ from wholebody.base.errors import UndefinedTermError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
+from wholebody.methods.qp.active_set import Parts
 from wholebody.methods.qp.quadratic_program import Multipliers, Rows, Violation
 from wholebody.methods.qp.settings import DESCENT, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.qp.tangential import Parts
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Linearisation, Lineariser
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.methods.qp.active_set import parts_of
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import Multipliers, QPSolution, QuadraticProgram, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
-from wholebody.methods.qp.tangential import parts_of
 from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7
