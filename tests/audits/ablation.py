@@ -166,7 +166,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     if method != "qp":
         return {}
     from wholebody.methods import starts
-    from wholebody.methods.acceleration import Anderson
     from wholebody.methods.qp import closest, feasibility, multistart, sqp
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp.feasibility import Feasibility
@@ -174,9 +173,9 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp.solvers.base import WorkingSet
     from wholebody.terms import linearisation
 
-    search, descent, corrected = multistart.Multistart, sqp.SQP, WorkingSet._corrected
+    search, descent, corrected = multistart.QPMultistart, sqp.SQP, WorkingSet._corrected
 
-    def plain(self: multistart.Multistart, start: Array) -> Any:
+    def plain(self: multistart.QPMultistart, start: Array) -> Any:
         probe = self._probe(start, 0.0)
         self._minima.add(probe.violation.total, probe.converged)
         return self._descend(probe.q, "restart") if probe.violation.worst <= self.settings.tolerance else probe
@@ -186,8 +185,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         return corrected(self, *given)
 
     return {
-        "watchdog": (descent, "_is_tentative", lambda self, here, there: False),
-        "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),

@@ -65,28 +65,6 @@ def test_steps_that_repeat_say_nothing_and_break_nothing():
     assert np.isfinite(fast).all()
 
 
-def test_a_shorter_bound_holds_for_one_proposal():
-    memory = Anderson()
-    for scale in (1.0, 0.999):
-        memory.propose(np.array([scale, 0.0]))
-        memory.record(np.array([scale, 0.0]))
-    assert np.abs(memory.propose(np.array([0.998, 0.0]), 2.0)).max() == pytest.approx(2.0 * 0.998)
-
-
-def test_after_forgetting_the_last_step_still_counts():
-    """The step whose accelerated form was rejected is the first of the new sequence."""
-    memory = Anderson()
-    for scale in (8.0, 3.0):
-        memory.propose(np.array([scale, 0.0]))
-        memory.record(np.array([scale, 0.0]))
-    memory.propose(np.array([1.0, 0.0]))
-    memory.forget()
-    memory.record(np.array([1.0, 0.0]))
-    assert memory.propose(np.array([0.5, 0.0])) is None
-    memory.record(np.array([0.5, 0.0]))
-    assert memory.propose(np.array([0.25, 0.0])) == pytest.approx([0.5, 0.0])
-
-
 def test_a_way_that_was_not_proposed_for_is_not_remembered():
     memory = Anderson()
     memory.record(np.array([5.0, 0.0]))

@@ -177,13 +177,14 @@ class LiveWorld:
         doing = (
             f"dragging {self.taken}" if self.taken else "drag a handle or a thing; click a handle to hold or release it"
         )
-        lost = ", ".join(name for name in self._renewed if self._lost(name))
+        lost = ", ".join(name for name in list(self._renewed) if self._lost(name))
         notes = [self._note, f"no place of {lost} arrives any more; it eases back" if lost else ""]
         return ": ".join((doing, "; ".join(filter(None, notes)))) if any(notes) else doing
 
     def _lost(self, name: str) -> bool:
         """Whether a tracker has not given the place of a handle for so long that it goes back."""
-        return self.world.time - self._renewed[name] > HELD
+        # the page's thread may have taken it meanwhile
+        return self.world.time - self._renewed.get(name, np.inf) > HELD
 
     def _handle_place(self, q: Array, name: str) -> Array:
         handle = self._subject.handles[name]
@@ -224,7 +225,7 @@ class LiveWorld:
 
     def _ease(self) -> None:
         """Bring handles back that a tracker has lost."""
-        for name in self._renewed:
+        for name in list(self._renewed):
             if self._lost(name):
                 share = min(1.0, self.world.dt / (0.3 * BACK))
                 self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])

@@ -1,4 +1,4 @@
-"""Anderson acceleration (Walker and Ni 2011, type II) of steps that form a linear sequence: docs/theory/qp.md."""
+"""Anderson acceleration (Walker and Ni 2011, type II) of steps that form a linear sequence."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Anderson:
         self._steps: list[Array] = []
         self._displacements: list[Array] = []
 
-    def propose(self, step: Array, stretch: float = STRETCH) -> Array | None:
-        """The accelerated step for the plain one (k,), at most `stretch` times as long; None while too little known."""
+    def propose(self, step: Array) -> Array | None:
+        """The accelerated step for the plain one (k,), at most `STRETCH` times as long; None while too little known."""
         self._step = step
         if len(self._steps) < 2:
             return None
@@ -33,15 +33,10 @@ class Anderson:
         changes = steps[1:] - steps[:-1]
         coefficients = np.linalg.lstsq(changes.T, step, rcond=None)[0]
         fast: Array = step - coefficients @ (displacements + changes)
-        longest, size = stretch * float(np.abs(step).max()), float(np.abs(fast).max())
+        longest, size = STRETCH * float(np.abs(step).max()), float(np.abs(fast).max())
         if not isfinite(size):
             return None
         return fast if size <= longest else fast * (longest / size)
-
-    def forget(self) -> None:
-        """Forget all steps but the last that was proposed for: an accelerated one was rejected."""
-        self._steps.clear()
-        self._displacements.clear()
 
     def record(self, displacement: Array) -> None:
         """Remember the displacement (k,) that was made after the last step was proposed."""

@@ -7,10 +7,9 @@ Hanafusa and Yoshikawa 1987), whose projector is not damped (Baerlocher and Boul
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
@@ -19,10 +18,9 @@ from wholebody.figures.state import State
 from wholebody.methods.base import DAMPING, Iterations, TimeLimit, Tolerance, UnsupportedTermError
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import Control
-from wholebody.methods.differential import REST
+from wholebody.methods.differential import Iteration, Settings, StepError
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import values
 from wholebody.tasks.bounds import allowed
 from wholebody.tasks.checks import undefined, values_and_rows
@@ -73,69 +71,53 @@ class DampedLeastSquares(Checked, Descends):
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`; contacts are ignored."""
         self._check_terms(problem)
-        descent = _Descent(problem, self, workspace.state, control)
-        converged = descent.run()
+        settings = Settings(self.tolerance, self.iterations, longest=1e9, decay=1.0, best=True, negligible=0.0)
+        descent = _Descent(problem, workspace, _Least(problem, workspace.state, self.damping), settings, control)
+        descent.go()
         return Ending(
-            descent.best, converged, descent.steps, tuple(descent.trace), f"in {descent.steps} steps", unit="steps",
+            descent.q, descent.met or descent.converged, descent.steps, tuple(descent.trace),
+            f"in {descent.steps} steps", unit="steps",
             caveat="this method sees neither contacts nor what people have by default",
         )  # fmt: skip
 
 
-class _Descent:
-    """One descent: the best posture so far, and its trace."""
+class _Descent(Iteration):
+    """Steps until goals and equalities are met; contacts do not count."""
 
-    def __init__(self, problem: Problem, method: DampedLeastSquares, state: State, control: Control) -> None:
-        self._problem, self._method, self._state, self._control = problem, method, state, control
-        self.best: Array = problem.scene.figure.clamp(problem.start)
-        self.trace: list[TraceEntry] = []
-        self.steps = 0
+    def look(self, state: State) -> tuple[float, float]:
+        """See `Iteration.look`; of the constraints the stated ones count."""
+        held = [term.lower - values(term, "value", term.value(state)) for term in self.problem.stated]
+        distance, angle, _ = goal_errors(self.problem, state)
+        return max(distance, angle), float(np.abs(np.hstack([np.zeros(1), *held])).max())
 
-    def run(self) -> bool:
-        """Descend; true if it converged or the goals are met, false if the iterations ran out."""
-        problem, method = self._problem, self._method
-        # of the tolerance, to which goals and equalities are met: the assessment rounds differently
-        enough = 0.5 * method.tolerance
-        q, step, best = self.best, 0.0, (np.inf, np.inf)
-        for _ in range(method.iterations + 1):
-            self._state.update(q)
-            held = [term.lower - values(term, "value", term.value(self._state)) for term in problem.stated]
-            distance, angle, _ = goal_errors(problem, self._state)
-            violation, error = float(np.abs(np.hstack([np.zeros(1), *held])).max()), max(distance, angle)
-            self.trace.append(TraceEntry(error, violation, 0.0, step))
-            self._control.tell(self.trace[-1])
-            if (max(violation, enough), error) < best:
-                best, self.best = (max(violation, enough), error), q
-            if max(violation, error) <= enough:
-                return True
-            if self.steps and step <= REST * method.tolerance:
-                return True
-            if self.steps == method.iterations or (self.steps and self._control.over):  # a frame gets on in any case
-                break
-            moved = self._moved(q, self._step())
-            if moved is None:
-                return False
-            step = float(np.abs(pin.difference(problem.scene.model, q, moved)).max(initial=0.0))
-            q = moved
-            self.steps += 1
-        return False
+    def clearance_violation(self, q: Array) -> float:
+        """None."""
+        return 0.0
 
-    def _moved(self, q: Array, way: Array) -> Array | None:
-        """Where a way (nv,), or a half of it or less, leads from q (nq,); None if a term is not finite on all of it."""
-        problem = self._problem
+    def moved(self, way: Array) -> Array:
+        """Where a way (nv,), or a half of it or less, leads; StepError if a term is not finite on all of it."""
+        problem = self.problem
         asked = (*problem.goals, *problem.stated, *problem.bounds, *problem.measures)
-        # of a step to where a term of one's own is not finite, before the descent ends
         for _ in range(12):
-            moved = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, q, way)))
-            error = undefined(asked, self._state.update(moved))
+            moved = super().moved(way)
+            error = undefined(asked, self.state.update(moved))
             if error is None:
                 return moved
-            self._control.step_back(error)
+            self.control.step_back(error)
             way = 0.5 * way
-        return None
+        raise StepError(str(error))
 
-    def _step(self) -> Array:
+
+class _Least(NamedTuple):
+    """Steps of a problem, at the present state."""
+
+    problem: Problem
+    state: State
+    damping: float
+
+    def step(self, *_: object) -> Array:
         """Displacement (nv,), within the limits."""
-        problem, state = self._problem, self._state
+        problem, state = self.problem, self.state
         equal = [(term, *values_and_rows(term, term.value, state)) for term in problem.stated]
         asked = [(goal.weight**0.5, *values_and_rows(goal, goal.error, state)) for goal in problem.goals]
         none = np.zeros((0, state.model.nv))
@@ -149,7 +131,7 @@ class _Descent:
             full: Array = stopped.copy()
             full[free] = _prioritised(
                 of_held[:, free], held - of_held @ stopped, of_wanted[:, free], wanted - of_wanted @ stopped,
-                self._method.damping,
+                self.damping,
             )  # fmt: skip
             over = free & ((full < lower) | (full > upper))
             if not over.any():

@@ -83,6 +83,7 @@ class Settings(NamedTuple):
     # out again
     best: bool = False
     least: int = 0  # fewest steps before the goals count as met, for tools that evade what comes
+    negligible: float = NEGLIGIBLE  # m, rad: see there
 
 
 class Iteration:
@@ -91,6 +92,7 @@ class Iteration:
     Attributes:
         q: (nq,) the present posture.
         steps: how many were made.
+        met: whether everything is met.
         converged: whether nothing moves any more.
         failure: the tool's message if it found no step.
         trace: one entry a posture.
@@ -99,11 +101,11 @@ class Iteration:
     def __init__(
         self, problem: Problem, workspace: Workspace, stepper: Stepper, settings: Settings, control: Control
     ) -> None:
-        self._problem, self._stepper, self._settings, self._control = problem, stepper, settings, control
-        self._proximity, self._state = workspace.proximity, workspace.state
+        self.problem, self._stepper, self._settings, self.control = problem, stepper, settings, control
+        self._proximity, self.state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[TraceEntry] = []
-        self.steps, self.converged, self.failure = 0, False, ""
+        self.steps, self.met, self.converged, self.failure = 0, False, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
         self._best, self._best_rank = self.q, (np.inf, np.inf)
 
@@ -114,33 +116,29 @@ class Iteration:
             self.q = self._best
 
     def _iterate(self) -> None:
-        settings, model = self._settings, self._problem.scene.model
+        settings, model = self._settings, self.problem.scene.model
         # of the tolerance, to which goals and constraints are met: the assessment rounds differently
         enough, length = 0.5 * settings.tolerance, 0.0
         while True:
-            error, violation = self._look()
+            error, violation = self.look(self.state.update(self.q))
             self.trace.append(TraceEntry(error, violation, 0.0, length))
-            self._control.tell(self.trace[-1])
+            self.control.tell(self.trace[-1])
             if self._settings.best:
                 self._rank(error, violation)
-            early = self.steps < settings.least
-            if (
-                not early
-                and max(error, violation) <= enough
-                and self._clearance_violation(self.q) <= enough + COAL_ACCURACY
-            ):
+            early, near = self.steps < settings.least, max(error, violation) <= enough
+            if not early and near and self.clearance_violation(self.q) <= enough + COAL_ACCURACY:
+                self.met = True
                 return
             if self.steps and not early and length <= REST * settings.tolerance:
                 self.converged = True
                 return
-            if self.steps == settings.iterations or (self.steps and self._control.over):  # a frame gets on in any case
+            if self.steps == settings.iterations or (self.steps and self.control.over):  # a frame gets on in any case
                 return
             try:
-                move = self._move()
+                moved = self.moved(self._move())
             except StepError as failure:
                 self.failure = str(failure)
                 return
-            moved = self._problem.scene.figure.clamp(np.asarray(pin.integrate(model, self.q, move)))
             length = float(np.abs(pin.difference(model, self.q, moved)).max(initial=0.0))
             self.q = moved
 
@@ -158,21 +156,24 @@ class Iteration:
         self._last = move
         return move
 
-    def _clearance_violation(self, q: Array) -> float:
+    def moved(self, way: Array) -> Array:
+        """Where a way (nv,) leads, within limits; `StepError` if nowhere."""
+        return self.problem.scene.figure.clamp(np.asarray(pin.integrate(self.problem.scene.model, self.q, way)))
+
+    def clearance_violation(self, q: Array) -> float:
         """By what the worst pair is nearer than its clearance at a posture (nq,) [m]."""
-        clearances = self._problem.clearances
-        near = self._proximity.query(self._state.update(q).data, float(clearances.max(initial=0.0)))
+        clearances = self.problem.clearances
+        near = self._proximity.query(self.state.update(q).data, float(clearances.max(initial=0.0)))
         return float((clearances[near.number] - near.distance).max(initial=0.0))
 
     def _rank(self, error: float, violation: float) -> None:
         """Keep the present posture if it is the best so far: least broken, then nearest; of equal ones the last."""
-        broken = max(violation, self._clearance_violation(self.q))
-        rank = (max(broken, self._settings.tolerance, NEGLIGIBLE), error)
+        broken = max(violation, self.clearance_violation(self.q))
+        rank = (max(broken, self._settings.tolerance, self._settings.negligible), error)
         if rank <= self._best_rank:
             self._best, self._best_rank = self.q, rank
 
-    def _look(self) -> tuple[float, float]:
-        """The largest error of a goal and of a constraint, metres or radians."""
-        state = self._state.update(self.q)
-        distance, angle, _ = goal_errors(self._problem, state)
-        return max(distance, angle), largest_violation(self._problem, state)
+    def look(self, state: State) -> tuple[float, float]:
+        """The largest error of a goal and of a constraint at a state, metres or radians."""
+        distance, angle, _ = goal_errors(self.problem, state)
+        return max(distance, angle), largest_violation(self.problem, state)

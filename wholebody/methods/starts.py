@@ -1,8 +1,10 @@
-"""Other starts for when the first one leads to a local minimum, and a rule for when enough were tried."""
+"""Multistart: one loop over starts, the starts, and a rule for when enough were tried."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +12,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.hand import opened_for_a_bar
 from wholebody.figures.state import State
+from wholebody.methods.contradictions import Contradiction
+from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import allowed
 from wholebody.tasks.grasp import Grasp
@@ -18,6 +22,67 @@ SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share o
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 TURN = 2.0 * np.pi  # rad: range of those
+
+
+End = TypeVar("End")
+
+
+class Attempt(NamedTuple, Generic[End]):
+    """A part of a search."""
+
+    starts: Iterable[Array]  # (nq,) postures to begin at
+    stage: Callable[[Array], End | None]  # where it leads from one; None where that is given up
+    how: str  # what the message says of an answer that it found
+
+
+class Multistart(ABC, Generic[End]):
+    """One loop over attempts, which keeps the best of their ends.
+
+    Attributes:
+        tried: starts of attempts.
+        how: what the message says of the best.
+        contradictions: of the problem, as far as it was looked for any.
+    """
+
+    def __init__(self, control: Control) -> None:
+        self.control, self.tried, self.how = control, 0, ""
+        self.contradictions = tuple[Contradiction, ...]()
+        self._best: End | None = None
+
+    @property
+    def best(self) -> End:
+        """The best end so far."""
+        assert self._best is not None
+        return self._best
+
+    def search(self, attempts: Iterable[Attempt[End]]) -> None:
+        """Try one start after the other until an end solves the problem, or others are not worth a try."""
+        for attempt in attempts:
+            for q in attempt.starts:
+                self.tried += 1
+                found = attempt.stage(q)
+                if found is not None and self.accept(found, attempt.how):
+                    return
+                if self.control.over or self.enough():
+                    return
+
+    def accept(self, found: End, how: str = "") -> bool:
+        """Keep the better one; whether the problem is solved now."""
+        if self._best is None or self.better(found, self._best):
+            self._best, self.how = found, how or self.how
+        return self.solves(self._best)
+
+    @abstractmethod
+    def better(self, one: End, other: End) -> bool:
+        """Whether one end is better than the other."""
+
+    @abstractmethod
+    def solves(self, end: End) -> bool:
+        """Whether an end solves the problem."""
+
+    @abstractmethod
+    def enough(self) -> bool:
+        """Whether no other start is worth a try, although the problem is not solved."""
 
 
 def off_limits(problem: Problem, state: State, start: Array) -> Array | None:

@@ -10,11 +10,10 @@ from wholebody.base.arrays import with_values
 from wholebody.bench.suite.problem_sets.bodies import TIPS
 from wholebody.bench.suite.problem_sets.reaching import reach_among
 from wholebody.bench.suite.stability.catalogue import cases
-from wholebody.methods.qp.active_set import room_for
+from wholebody.methods.qp.active_set import parts_of, room_for
 from wholebody.methods.qp.quadratic_program import Multipliers, QuadraticProgram, Rows
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
-from wholebody.methods.qp.tangential import parts_of
 
 
 def rows_of(program, rng):

@@ -1,4 +1,4 @@
-"""The two parts of a step, and where the part along the constraints leads, against dense linear algebra."""
+"""The two parts of a step against dense linear algebra."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ import pytest
 from tests.reference import active_set as reference
 from tests.reference.active_set import same
 from wholebody.base.arrays import with_values
-from wholebody.methods.qp.active_set import room_for
+from wholebody.methods.qp.active_set import Parts, parts_of, room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import DESCENT
 from wholebody.methods.qp.solvers.registry import make_solver
-from wholebody.methods.qp.tangential import Extrapolation, Parts, parts_of
 
 NO_SHIFT = np.zeros(0)
 
@@ -84,59 +83,3 @@ def test_a_near_bound_stays_held_and_the_way_to_a_far_one_is_tangential(off, alo
     split, answer = parts(program)
     assert same(answer.active, ActiveSet(*np.array([[True, False, False], [False] * 3]), np.zeros(0, dtype=bool)))
     assert split.tangential == pytest.approx([along, 1.0, -0.5])
-
-
-def gone(ahead: Extrapolation, sizes: list[float]) -> None:
-    """Steps of these sizes along the first axis, whose normal parts are along the second."""
-    for size in sizes:
-        split = Parts(np.array([0.0, size**2]), np.array([size, 0.0]))
-        ahead.propose(split, free_program(2))
-        ahead.record(split, split.normal + split.tangential, False)
-
-
-def test_steps_that_shrink_by_a_factor_are_taken_to_their_limit():
-    """1 + 1/2 + 1/4 + ... along the constraints; the normal part is the program's own, whatever the others were."""
-    ahead = Extrapolation()
-    gone(ahead, [0.4, 0.2])
-    assert ahead.propose(Parts(np.array([0.0, 7.0]), np.array([0.1, 0.0])), free_program(2)) == pytest.approx(
-        [0.2, 7.0]
-    )
-
-
-def test_steps_that_grow_are_followed_and_not_turned_back():
-    """Where the measures curve downwards the sequence has its limit behind; that is where they are flat, not least."""
-    ahead = Extrapolation()
-    gone(ahead, [0.1, 0.13])
-    split = Parts(np.zeros(2), np.array([0.169, 0.0]))
-    assert ahead.propose(split, free_program(2)) == pytest.approx([DESCENT.along * 0.169, 0.0])
-
-
-def test_a_refused_proposal_shortens_the_next_ones():
-    ahead, factors = Extrapolation(), []
-    for _ in range(2):
-        gone(ahead, [0.1, 0.13])
-        split = Parts(np.zeros(2), np.array([0.169, 0.0]))
-        factors.append(float(ahead.propose(split, free_program(2))[0] / 0.169))
-        ahead.rejected()
-    assert factors == pytest.approx([3.0, 2.0])
-
-
-def test_proposals_stay_in_the_box():
-    ahead = Extrapolation()
-    gone(ahead, [0.4, 0.2])
-    program = with_values(free_program(2), lower=np.full(2, -0.15), upper=np.full(2, 0.15))
-    assert ahead.propose(Parts(np.zeros(2), np.array([0.1, 0.0])), program) == pytest.approx([0.15, 0.0])
-
-
-def test_a_proposal_that_would_be_the_own_step_is_not_made():
-    """After two refusals steps that grow are followed no farther than they are; that is the program's own step."""
-    ahead = Extrapolation()
-    for _ in range(2):
-        gone(ahead, [0.1, 0.13])
-        ahead.propose(Parts(np.zeros(2), np.array([0.169, 0.0])), free_program(2))
-        ahead.rejected()
-    gone(ahead, [0.1, 0.13])
-    split = Parts(np.zeros(2), np.array([0.169, 0.0]))
-    assert ahead.propose(split, free_program(2)) is None
-    ahead.record(split, split.normal + split.tangential, False)
-    assert ahead.propose(Parts(np.zeros(2), np.array([0.2, 0.0])), free_program(2))[0] / 0.2 == pytest.approx(2.0)

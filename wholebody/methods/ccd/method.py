@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice, repeat
 from math import inf
 from typing import Annotated, Any
 
@@ -19,8 +20,9 @@ from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.terms import Request, read
 from wholebody.methods.conclusion import Descends, DescentTracker, Ending
-from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
+from wholebody.methods.contradictions import NEAREST, contradictions, least_left
 from wholebody.methods.control import Control
+from wholebody.methods.starts import Attempt, Multistart
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
@@ -139,18 +141,18 @@ class _Shared:
         return self._reach, self._resolver
 
 
-class _Search:
+class _Search(Multistart[_Trial]):
     """One solve: starts, and from each of them reaching and overlap resolution in alternation."""
 
     def __init__(self, method: CCD, problem: Problem, shared: _Shared, control: Control) -> None:
-        self._method, self._problem, self._control = method, problem, control
+        super().__init__(control)
+        self._method, self._problem = method, problem
         self._request = read(problem, shared.workspace.state)
         self._reach, self._resolver = shared.ready(self._request, control)
         self._tolerance = min(TOLERANCE, SHARE * method.tolerance)
         self._resolver.begin(problem.clearances, self._tolerance, control)
         self._rng = np.random.default_rng(method.seed)
         self.sweeps = 0
-        self.contradictions: tuple[Contradiction, ...] = ()
         self._workspace = shared.workspace
         self.trace: list[TraceEntry] = []
 
@@ -170,27 +172,24 @@ class _Search:
 
     def run(self) -> _Trial:
         """The best result of all starts, or the first that meets goals and clearances."""
-        start = self._problem.scene.figure.clamp(self._problem.start)
+        self.search(self._attempts(self._problem.scene.figure.clamp(self._problem.start)))
+        if self.solves(self.best):
+            self.contradictions = ()
+        return self.best if not self.control.over else replace(self.best, converged=False)
+
+    def _attempts(self, start: Array) -> Iterator[Attempt[_Trial]]:
         self._resolver.query(start)
         free = start if self._resolver.deepest <= self._tolerance else None
-        best = self._attempt(start, free, "")
-        if not self._ends(best):
-            self.contradictions = contradictions(self._problem, self._workspace)
-        for attempt in range(1, 1 + self._method.restarts):
-            if self._ends(best) or self._cannot_gain(best):
-                break
-            near = (0.0, 0.05, 0.2, 0.6)  # rad: from the present posture; later starts are anywhere
-            size = near[attempt] if attempt < len(near) else inf
-            trial = self._attempt(self._reach.disturbed(start, size, self._rng), free, "restart")
-            if trial.better(best, self._tolerance):
-                best = trial
-        if self._solves(best):
-            self.contradictions = ()
-        return best if not self._control.over else replace(best, converged=False)
+        yield Attempt([start], lambda q: self._attempt(q, free, ""), "")
+        self.contradictions = contradictions(self._problem, self._workspace)
+        if not self.enough():
+            sizes = islice(chain((0.05, 0.2, 0.6), repeat(inf)), self._method.restarts)  # rad: nearby, then anywhere
+            starts = (self._reach.disturbed(start, size, self._rng) for size in sizes)
+            yield Attempt(starts, lambda q: self._attempt(q, free, "restart"), "")
 
     def _closed(self, best: _Trial) -> _Trial:
         """A trial that misses the goals, or an intermediate posture, where loops are closed and nothing overlaps."""
-        if not self._request.loops or self._solves(best):
+        if not self._request.loops or self.solves(best):
             return best
         self._reach.begin(replace(self._request, goals=self._request.loops), Control(np.inf))
         model, start = self._problem.scene.model, self._problem.scene.figure.clamp(self._problem.start)
@@ -202,13 +201,18 @@ class _Search:
                 return replace(best, q=q)
         return best
 
-    def _ends(self, best: _Trial) -> bool:
-        return self._solves(best) or self._control.over
+    def better(self, one: _Trial, other: _Trial) -> bool:
+        """See `Multistart.better`."""
+        return one.better(other, self._tolerance)
 
-    def _cannot_gain(self, best: _Trial) -> bool:
+    def solves(self, end: _Trial) -> bool:
+        """See `Multistart.solves`."""
+        return end.error <= SHARE * self._method.tolerance and end.overlap <= self._tolerance
+
+    def enough(self) -> bool:
         """Whether the problem has no solution, or none nearer than the best result."""
         least = least_left(self.contradictions)
-        return least is None or bool(least and best.error <= NEAREST * least)
+        return least is None or bool(least and self.best.error <= NEAREST * least)
 
     def pushed_out(self, q: Array) -> Array:
         """The result of overlap resolution at a posture q (nq,), or at one beside it, if that is better."""
@@ -221,9 +225,6 @@ class _Search:
             if not left:
                 break
         return out
-
-    def _solves(self, trial: _Trial) -> bool:
-        return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._tolerance
 
     def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
         """Reach and resolve overlap in alternation, until goals and clearances are met, or neither step gains."""
@@ -243,11 +244,11 @@ class _Search:
                 trial = _Trial(back, self._resolver.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
             self.trace.append(TraceEntry(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
-            self._control.tell(self.trace[-1])
+            self.control.tell(self.trace[-1])
             gained = best is None or trial.better(best, self._tolerance)
             if gained:
                 best = trial
-            if self._solves(trial) or not gained or self._control.over:
+            if self.solves(trial) or not gained or self.control.over:
                 break
         assert best is not None
         return best

@@ -18,7 +18,7 @@ from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
-from wholebody.methods.newton.multistart import Search, Settings
+from wholebody.methods.newton.multistart import NewtonMultistart, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
 from wholebody.problem import Problem
@@ -72,8 +72,7 @@ class Newton(Settings, Descends):
         """See `Descends._descend`."""
         active_system = FigureSystem(problem, workspace, self.algebra)
         active_system.control = control
-        search = Search(active_system, self)
-        return search.ending(search.everywhere(problem.scene.figure.clamp(problem.start)))
+        return NewtonMultistart(active_system, self).everywhere(problem.scene.figure.clamp(problem.start))
 
     def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
         """A tracker of goals that move from call to call; it analyses its equations once.
@@ -176,9 +175,9 @@ class NewtonTracker(SolvingTracker):
         """Solve for the problem's present goals from the posture q (nq,), without other starts."""
         q = posture(q, self.workspace.model.nq)
         with self._alone:
-            search = Search(self._renewed(), self._settings)
-            search.active_system.control = control = Control(np.inf)
-            ending = search.ending(search.from_here(q))
+            active_system = self._renewed()
+            active_system.control = control = Control(np.inf)
+            ending = NewtonMultistart(active_system, self._settings).from_here(q)
         tolerance = self._settings.tolerance
         return concluded(self.problem, ending, method=self._method.name, tolerance=tolerance, control=control)
 

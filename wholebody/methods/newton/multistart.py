@@ -15,7 +15,7 @@ from wholebody.base.checks import known
 from wholebody.base.fields import Checked
 from wholebody.methods.base import Iterations, Restarts, Seed, TimeLimit, Tolerance
 from wholebody.methods.conclusion import Ending, assessed_tolerance, meets
-from wholebody.methods.contradictions import Contradiction, contradictions, least_left
+from wholebody.methods.contradictions import contradictions, least_left
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra import NAMES
@@ -23,7 +23,7 @@ from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem
 from wholebody.methods.simplification import beyond_reach
-from wholebody.methods.starts import Minima, off_limits, restarts
+from wholebody.methods.starts import Attempt, Minima, Multistart, off_limits, restarts
 from wholebody.solution import TraceEntry
 from wholebody.tasks.frame import Frame
 from wholebody.tasks.point import Point
@@ -53,41 +53,65 @@ class Settings(Checked):
 
 
 class SearchResult(NamedTuple):
-    """The result from one start: the posture (nq,), its assessment, how the iteration ended, and the start in words."""
+    """The result from one start: the posture (nq,), its assessment, and how the iteration ended."""
 
     q: Array
     judgement: Assessment
     reached: FeasibilityResult
-    how: str
 
 
-class Search:
-    """The search for one problem, which keeps the best result."""
+class NewtonMultistart(Multistart[SearchResult]):
+    """The search for one problem."""
 
     def __init__(self, active_system: FigureSystem, settings: Settings) -> None:
+        super().__init__(active_system.control)
         self.active_system, self.settings = active_system, settings
-        self.iterations = 0
+        self.iterations, self._most = 0, np.inf  # after which no other start follows
         self.residuals: list[float] = []
-        self.contradictions: tuple[Contradiction, ...] = ()
+        self._minima = Minima()
 
-    def from_here(self, q: Array) -> SearchResult:
-        """The result from a posture (nq,) alone."""
-        return self._go(q, "", self.settings.iterations)
+    def from_here(self, q: Array) -> Ending:
+        """The end of the search from a posture (nq,) alone."""
+        self.accept(self._go(q, self.settings.iterations))
+        return self._ending()
 
-    def everywhere(self, q: Array) -> SearchResult:
+    def everywhere(self, q: Array) -> Ending:
         """The best result of all starts; if it solves the problem, its measures are minimised."""
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
-        best = self._go(q, "", STARTS.trial) if hopeless else self.from_here(q)
-        if not self._solves(best) and not hopeless:
-            best = self._from_other_starts(q, best, STARTS.beyond if self._beyond_reach() else None)
-        if self.active_system.control.over:
-            return best
-        if not best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
-            best = self._least_violation(best, q)
-        if self._solves(best) and self.active_system.objective.minimised:
-            best = self._refined(best)
-        return best
+        self.search(self._attempts(q, hopeless))
+        if not self.control.over:
+            if not self.best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
+                self.accept(self._least_violation(q))
+            if self.solves(self.best) and self.active_system.objective.minimised:
+                self._refine()
+        if self.solves(self.best):
+            self.contradictions = ()  # by less than the tolerance
+        return self._ending()
+
+    def _attempts(self, q: Array, hopeless: bool) -> Iterator[Attempt[SearchResult]]:
+        most = STARTS.trial if hopeless else self.settings.iterations
+        yield Attempt([q], lambda start: self._go(start, most), "")
+        if hopeless:
+            return
+        self._most = self.iterations + STARTS.iterations
+        given = self.active_system.problem, self.active_system.workspace.state, q
+        count = STARTS.beyond if self._beyond_reach() else None
+        bent = off_limits(*given)
+        others = restarts(*given, np.random.default_rng(self.settings.seed), self.settings.restarts)
+        bents = [] if bent is None else [*filter(self.active_system.defined, [bent])]
+        yield Attempt(bents, self._trial, " from a start with bent joints")
+        left = None if count is None else count - len(bents)
+        yield Attempt(islice(filter(self.active_system.defined, others), left), self._trial, " from another start")
+
+    def _trial(self, start: Array) -> SearchResult:
+        """The result from another start, which has to come nearer than the best so far in a few iterations."""
+        found = self._go(start, min(STARTS.trial, self.settings.iterations))
+        if self.better(found, self.best) and not found.reached.stationary and not self.solves(found):
+            found = self._go(found.q, self.settings.iterations)
+        least = max(_broken(found), self.settings.assessed_tolerance) + _missed(found)
+        self._minima.add(least, found.reached.stationary)
+        return found
 
     def _beyond_reach(self) -> bool:
         """Whether a goal is out of reach for certain, so that no other start can solve the problem."""
@@ -103,50 +127,22 @@ class Search:
                 return True
         return False
 
-    def _from_other_starts(self, q: Array, best: SearchResult, count: int | None) -> SearchResult:
-        """The best result of other starts, at most `count`, and the best so far; each start has a trial first."""
-        minima, control, most = Minima(), self.active_system.control, self.iterations + STARTS.iterations
-        for start, how in islice(self._starts(q), count):
-            if minima.complete:
-                break
-            found = self._go(start, how, min(STARTS.trial, self.settings.iterations))
-            if self._better(found, best) and not found.reached.stationary and not self._solves(found):
-                found = self._go(found.q, how, self.settings.iterations)
-            least = max(_broken(found), self.settings.assessed_tolerance) + _missed(found)
-            minima.add(least, found.reached.stationary)
-            best = found if self._better(found, best) else best
-            if self._solves(best):
-                self.contradictions = ()
-            if self._solves(best) or self.iterations > most or control.over or control.spent > STARTS.time_share:
-                break
-        return best
-
-    def ending(self, found: SearchResult) -> Ending:
-        """A result as the end of the search."""
-        reported = ", ".join(self.active_system.objective.reported)
+    def _ending(self) -> Ending:
+        """The best result as the end of the search."""
+        found, reported = self.best, ", ".join(self.active_system.objective.reported)
         return Ending(
             found.q,
             found.reached.stationary,
             self.iterations,
             tuple(TraceEntry(error, 0.0, 0.0, 0.0) for error in self.residuals),
-            f"in {self.iterations} iterations{found.how}",
+            f"in {self.iterations} iterations{self.how}",
             remark=f"; {reported} is reported, not minimised" if reported else "",
             contradictions=self.contradictions,
             judgement=found.judgement,
             method=f"newton/{self.active_system.algebra.name}",
         )
 
-    def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
-        problem = self.active_system.problem
-        start = off_limits(problem, self.active_system.workspace.state, q)
-        if start is not None and self.active_system.defined(start):
-            yield start, " from a start with bent joints"
-        rng = np.random.default_rng(self.settings.seed)
-        for start in restarts(problem, self.active_system.workspace.state, q, rng, self.settings.restarts):
-            if self.active_system.defined(start):
-                yield start, " from another start"
-
-    def _go(self, q: Array, how: str, iterations: int, system: FigureSystem | None = None) -> SearchResult:
+    def _go(self, q: Array, iterations: int, system: FigureSystem | None = None) -> SearchResult:
         """The result from a posture (nq,), by the search's own equations or by others of the same problem."""
         active_system, settings = self.active_system if system is None else system, self.settings
         reached = satisfy(
@@ -158,33 +154,39 @@ class Search:
         )
         self.iterations += reached.iterations
         self.residuals += reached.residuals
-        return self._judged(reached, how, active_system)
+        return self._judged(reached, active_system)
 
-    def _refined(self, found: SearchResult) -> SearchResult:
-        """The same with lower measures, if possible."""
-        x, spent, _ = refine(self.active_system, found.reached.x, self.settings.tolerance)
+    def _refine(self) -> None:
+        """Take the same with lower measures, if possible."""
+        reached = self.best.reached
+        x, spent, _ = refine(self.active_system, reached.x, self.settings.tolerance)
         self.iterations += spent
-        lower = self._judged(with_values(found.reached, x=x), found.how, self.active_system)
-        return lower if self._solves(lower) and self._better(lower, found) else found
+        lower = self._judged(with_values(reached, x=x), self.active_system)
+        if self.solves(lower):
+            self.accept(lower)
 
-    def _least_violation(self, best: SearchResult, q: Array) -> SearchResult:
-        """The posture with the least violation of the constraints, if it violates them less than the best so far."""
+    def _least_violation(self, q: Array) -> SearchResult:
+        """The posture with the least violation of the constraints."""
         whole = self.active_system
         elastic = FigureSystem(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
         elastic.control = whole.control
-        found = self._go(q, best.how, self.settings.iterations, elastic)
-        stationary = best.reached.stationary or found.reached.stationary
-        found = with_values(found, reached=with_values(found.reached, stationary=stationary))
-        return found if self._better(found, best) else best
+        found = self._go(q, self.settings.iterations, elastic)
+        stationary = self.best.reached.stationary or found.reached.stationary
+        return with_values(found, reached=with_values(found.reached, stationary=stationary))
 
-    def _judged(self, reached: FeasibilityResult, how: str, system: FigureSystem) -> SearchResult:
+    def _judged(self, reached: FeasibilityResult, system: FigureSystem) -> SearchResult:
         q = system.posture(reached.x)
-        return SearchResult(q, assess(system.problem, q), reached, how)
+        return SearchResult(q, assess(system.problem, q), reached)
 
-    def _solves(self, found: SearchResult) -> bool:
-        return meets(found.judgement, self.settings.tolerance)
+    def solves(self, end: SearchResult) -> bool:
+        """See `Multistart.solves`."""
+        return meets(end.judgement, self.settings.tolerance)
 
-    def _better(self, one: SearchResult, other: SearchResult) -> bool:
+    def enough(self) -> bool:
+        """Whether all minima are found, or the iterations or the time for other starts are spent."""
+        return self._minima.complete or self.iterations > self._most or self.control.spent > STARTS.time_share
+
+    def better(self, one: SearchResult, other: SearchResult) -> bool:
         """Whether one result is better: in the violation, then in the goal errors, then in the measures."""
         enough = self.settings.assessed_tolerance
         for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):

@@ -5,14 +5,14 @@ docs/theory/qp_programs.md has the equations (Hintermueller, Ito and Kunisch 200
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
-from wholebody.methods.qp.settings import CORRECTIONS
+from wholebody.methods.qp.settings import CORRECTIONS, DESCENT
 
 SEMISMOOTH = "semismooth newton"
 """What `QPSolution.by` says of answers that `last_resort` found."""
@@ -38,12 +38,40 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     return QPSolution(x, active, True, 0) if settled else None
 
 
-def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, work: Array) -> Array | None:
+def _without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, work: Array) -> Array | None:
     """Minimiser (n,), clipped to the box, with g = 0, an active set and targets (m,); None where not finite."""
     program.check_shapes(active)
     x = np.empty(program.size)
     without = with_values(program, linear=np.zeros(program.size), target=target).packed()
     return x if compiled_kernel().minimise_with(without, active, CORRECTIONS.tolerance, work, x) else None
+
+
+class Parts(NamedTuple):
+    """A step in two parts, (n,) each."""
+
+    normal: Array
+    tangential: Array
+
+
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, work: Array) -> Parts | None:
+    """The normal and tangential part of the answer of a program; None where its face has no normal part.
+
+    A bound that was some way off and now holds belongs to the measures, so to the tangential part, unless the normal
+    one comes to it too. `shift` (s,), of the method of multipliers, makes up for g in the first errors.
+    """
+    target = program.target.copy()
+    target[: len(shift)] += shift
+    active, normal = answer.active, None
+    lower = active.lower & (program.lower >= -DESCENT.room)
+    upper = active.upper & (program.upper <= DESCENT.room)
+    left = (active.lower & ~lower) | (active.upper & ~upper)
+    if left.any():
+        normal = _without_gradient(program, with_values(active, lower=lower, upper=upper), target, work)
+        if normal is not None and not ((program.lower < normal) & (normal < program.upper))[left].all():
+            normal = None
+    if normal is None:
+        normal = _without_gradient(program, active, target, work)
+    return None if normal is None else Parts(normal, answer.x - normal)
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:

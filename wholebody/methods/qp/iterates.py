@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,11 +13,11 @@ from wholebody.base.errors import UndefinedTermError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
+from wholebody.methods.qp.active_set import Parts
 from wholebody.methods.qp.quadratic_program import Multipliers, Rows, Violation
 from wholebody.methods.qp.settings import DESCENT, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.qp.tangential import Parts
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Linearisation, Lineariser
 
@@ -79,14 +78,6 @@ class Run(NamedTuple):
     solver: QPSolver  # solves the programs
     trace: list[TraceEntry]  # grows by one entry a program
     control: Control  # what may end it
-
-
-class Attempt(NamedTuple):
-    """A part of a search."""
-
-    starts: Iterable[Array]  # (nq,) postures to begin at
-    stage: Callable[[Array], LocalSolution | None]  # where it leads from one; None where that is given up
-    how: str  # what the message says of an answer that it found
 
 
 @dataclass

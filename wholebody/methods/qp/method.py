@@ -14,7 +14,7 @@ from wholebody.methods.conclusion import Descends, Ending, concluded, meets
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain import Met, from_seeds
 from wholebody.methods.qp.chain_batch import Batch, batches
-from wholebody.methods.qp.multistart import Multistart
+from wholebody.methods.qp.multistart import QPMultistart
 from wholebody.methods.qp.settings import Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
@@ -88,7 +88,7 @@ class QP(Settings, Descends):
         met = from_seeds(problem, workspace, self, control)
         if (ending := self._complete(problem, met)) is not None:
             return ending
-        search = Multistart(problem, workspace, self._qp_solver(), self, control)
+        search = QPMultistart(problem, workspace, self._qp_solver(), self, control)
         begin, before = ((), ()) if met is None else (() if met.complete else met.begins, met.trace)
         known = () if met is None else (met.blocked, met.near, _measure(problem, workspace, met.through))
         best = search.run(begin, *known)
@@ -131,7 +131,7 @@ class QP(Settings, Descends):
                 met = from_seeds(problem.with_start(problem.scene.figure.clamp(start)), workspace, alone, control)
                 ending = self._complete(problem, met)
                 if ending is None:
-                    search = Multistart(problem, workspace, self._qp_solver(), alone, control)
+                    search = QPMultistart(problem, workspace, self._qp_solver(), alone, control)
                     end = search.feasibility_first(start) or search.directly(start)
                     ending = Ending(
                         end.q, end.converged, search.spent, tuple(search.trace), search.how,

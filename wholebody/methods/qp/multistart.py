@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -12,30 +12,28 @@ import pinocchio as pin
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array, with_values
-from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
+from wholebody.methods.contradictions import NEAREST, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
-from wholebody.methods.qp.iterates import Attempt, LocalSolution, held, moving
+from wholebody.methods.qp.iterates import LocalSolution, held, moving
 from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
-from wholebody.methods.starts import Minima, alike, hooked_hands, restarts, throughout
+from wholebody.methods.starts import Attempt, Minima, alike, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Effort
 
 
-class Multistart(Search):
+class QPMultistart(Search):
     """The search for one problem."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
         super().__init__(problem, workspace, solver, settings, control)
-        self.tried = 0  # starts of attempts
-        self.contradictions = tuple[Contradiction, ...]()
         self._start = problem.scene.figure.clamp(problem.start)
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
@@ -50,11 +48,11 @@ class Multistart(Search):
         # `least`: measures where the goals are known to be met, if through things; 0 where nothing is known
         self.out_of_reach, self._through_measure = bool(near), least
         if not near:
-            self._search(self._attempts(begin or (self._start,)))
+            self.search(self._attempts(begin or (self._start,)))
         for q in near:
-            self._accept(self._ran(self._closest(), q), self.how)
+            self.accept(self._ran(self._closest(), q))
         if other is not None:
-            self._accept(self.directly(other), "directly")
+            self.accept(self.directly(other), "directly")
         self._find_closest()
         self._go_on()
         self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
@@ -64,18 +62,12 @@ class Multistart(Search):
             self._best = with_values(self.best, converged=True)
         return with_values(self.best, converged=False) if self.control.reason else self.best
 
-    def _search(self, attempts: Iterable[Attempt]) -> None:
-        for attempt in attempts:
-            for q in attempt.starts:
-                self.tried += 1
-                local = attempt.stage(q)
-                if local is not None and self._accept(local, attempt.how or self.how):
-                    return
-                enough = self._minima.complete or self._relaxed_minima.complete or alike(self._in_contact)
-                if enough or self.control.over or self._left < 0 or self._proven():
-                    return
+    def enough(self) -> bool:
+        """Whether the programs are spent, all minima found, or the best is known to be the closest to the goals."""
+        found = self._minima.complete or self._relaxed_minima.complete or alike(self._in_contact)
+        return found or super().enough() or self._proven()
 
-    def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt]:
+    def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
         yield Attempt(begin, self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
@@ -89,7 +81,7 @@ class Multistart(Search):
         elif not self._proven():
             yield from self._attempts_for_feasibility()
 
-    def _attempts_for_feasibility(self) -> Iterator[Attempt]:
+    def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
         start, least, tried = self._start, self._least, self.tried
         self._first = len(self.trace)
@@ -113,7 +105,7 @@ class Multistart(Search):
         restarts = self.settings.restarts
         yield from self._from_elsewhere(min(restarts, SEARCH.inside_probes) if least else restarts)
 
-    def _from_elsewhere(self, count: int) -> Iterator[Attempt]:
+    def _from_elsewhere(self, count: int) -> Iterator[Attempt[LocalSolution]]:
         """Those from other starts, of which there are `count`."""
         rng = np.random.default_rng(self.settings.seed)
         if few := moving(self._shared, self.best.q) < SEARCH.few:
@@ -129,17 +121,17 @@ class Multistart(Search):
     def _without_measures(self, start: Array) -> LocalSolution | None:
         """Seek a feasible posture so that no measure changes what is reached, and descend; None: nothing but start."""
         settings = replace(self.settings, measures=False)
-        found = Multistart(self.problem, self.lineariser.workspace, self.solver, settings, self.control)
+        found = QPMultistart(self.problem, self.lineariser.workspace, self.solver, settings, self.control)
         found.contradictions, found._least = self.contradictions, self._least
         found._best = begin = found._ran(found._feasibility(found.lineariser, 0, ""), start)
-        found._search(found._attempts_for_feasibility())
+        found.search(found._attempts_for_feasibility())
         self.spent += found.spent
         self.tried += found.tried
         self.trace += found.trace
         self.out_of_reach, self._near = found.out_of_reach, found._near
         if found.best is begin and begin.violation.worst > self.settings.tolerance:
             return None
-        return self._descend(found.best.q) if self._accept(found.best, found.how) else found.best
+        return self._descend(found.best.q) if self.accept(found.best, found.how) else found.best
 
     def _beside(self, count: int) -> Iterator[Array]:
         """Postures whose goals are displaced at random, where descents that pass through nothing lead to (nq,)."""
@@ -168,14 +160,14 @@ class Multistart(Search):
         """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
         for q in self._hooked(start):
             local = self._relaxed(q)
-            if local is not None and self._accept(local, "from hooked hands"):
+            if local is not None and self.accept(local, "from hooked hands"):
                 return local
         return self.feasibility_first(start)
 
     def _gripping(self, start: Array) -> LocalSolution | None:
         """Close hands from before a grip, first so that nothing else changes sides."""
         for q in self._hooked(start) or [start]:
-            if self._accept(local := self._free(q), "from before a grip"):
+            if self.accept(local := self._free(q), "from before a grip"):
                 return local
         return self._closing(start)
 
@@ -186,7 +178,7 @@ class Multistart(Search):
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         relaxed = self._probe(start, SEARCH.relaxation_depth)
-        if not self._ends(relaxed, SEARCH.reached):
+        if not self.solves(relaxed, SEARCH.reached):
             self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
             return None
         return self._free(relaxed.q, start)
@@ -218,7 +210,7 @@ class Multistart(Search):
         self.spent += search.spent
         self.trace += search.trace
         if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
-            self._accept(self._descend(local.q), self.how)
+            self.accept(self._descend(local.q))
         return self.best.measure < SEARCH.moved * before
 
     def _go_on(self) -> None:
@@ -226,7 +218,7 @@ class Multistart(Search):
         gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
         while gains and not self.best.converged and self._left > 0 and not self.control.over:
             before = self.best.measure
-            gains = self._accept(self._descend(self.best.q), self.how) and self.best.measure < SEARCH.moved * before
+            gains = self.accept(self._descend(self.best.q)) and self.best.measure < SEARCH.moved * before
 
     @property
     def _touches(self) -> bool:
@@ -248,7 +240,7 @@ class Multistart(Search):
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
             local = self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start)
-            self._accept(local, self.how)
+            self.accept(local)
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _seek_lower(self, count: int) -> None:
@@ -263,7 +255,7 @@ class Multistart(Search):
             if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
         for local in sorted(found, key=lambda each: each.measure)[:count]:
-            self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
+            self.accept(self._descend(local.q, note="for measure"), "from a start for the measures")
         if not self.settings.restarts:
             return
         begun = 2 * len(self.trace) + SEARCH.cheap
@@ -302,7 +294,7 @@ class Multistart(Search):
         descent = self._descent(self.settings.iterations, None, "for measure")
         # far from the least measures, steps along curved constraints are short inside of a narrow funnel
         descent.width, descent.below = SEARCH.width, SEARCH.less * self.best.measure
-        self._accept(self._ran(descent, local.q), "from a start for the measures")
+        self.accept(self._ran(descent, local.q), "from a start for the measures")
 
     def _find_closest(self) -> None:
         """Where the goals are not reached, find the closest posture, then improve the measures from there."""
@@ -311,16 +303,16 @@ class Multistart(Search):
             return
         if self.out_of_reach:
             local = self._ran(self._closest(), self.best.q)
-            self._accept(local, self.how)
+            self.accept(local)
         if not held(self.best, tolerance):
-            self._accept(self._stay(self.best), self.how)
+            self.accept(self._stay(self.best))
         if self.problem.goals and not held(self.best, tolerance):
             self._seek_held()
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
         near, missed = self._near, self.best.violation
         if near is not None and missed.worst > tolerance and SEARCH.agree * near.violation.total < missed.total:
-            self._accept(self._ran(self._closest(), self._probe(near.q, 0.0).q), self.how)
+            self.accept(self._ran(self._closest(), self._probe(near.q, 0.0).q))
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
@@ -332,17 +324,17 @@ class Multistart(Search):
         if near is not None and (self.out_of_reach or self._least):  # else other starts were tried
             self._missed = SEARCH.agree * near.violation.left
             self._minima, self._relaxed_minima, self._in_contact = Minima(), Minima(), []
-            self._search(self._from_elsewhere(self.settings.restarts))
-            self._accept(self._ran(self._closest(), self.best.q), self.how)
+            self.search(self._from_elsewhere(self.settings.restarts))
+            self.accept(self._ran(self._closest(), self.best.q))
         if not held(self.best, tolerance) and not self.control.over:
             alone, settings = copy.copy(self.problem), replace(self.settings, measures=False)
             alone.goals = ()
-            search = Multistart(alone, self.lineariser.workspace, self.solver, settings, self.control)
+            search = QPMultistart(alone, self.lineariser.workspace, self.solver, settings, self.control)
             found = search.run()
             self.spent += search.spent
             self.trace += search.trace
             for stage in (self._feasibility(self.lineariser, 0, ""), self._closest()):
-                self._accept(self._ran(stage, found.q), self.how)
+                self.accept(self._ran(stage, found.q))
 
     def _proven(self) -> bool:
         """Whether the best posture is known to be the closest to the goals."""
@@ -369,7 +361,7 @@ class Multistart(Search):
         """Find the closest posture from the best one."""
         nearest = self._ran(self._closest(), self.best.q)
         if not nearest.converged:
-            self._accept(nearest, self.how)
+            self.accept(nearest)
             nearest = self._descend(self.best.q, note="nearest", measures=False)
-        self._accept(nearest, self.how)
+        self.accept(nearest)
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)

@@ -13,19 +13,21 @@ from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.methods.starts import Multistart
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Lineariser
 
 
-class Search:
-    """What descents of one problem share; it keeps the best of their ends."""
+class Search(Multistart[LocalSolution]):
+    """What descents of one problem share."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
-        self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
+        super().__init__(control)
+        self.problem, self.solver, self.settings = problem, solver, settings
         self.subproblem = Subproblem(problem, workspace.state)
         self.lineariser = problem.lineariser(workspace)
         self.trace: list[TraceEntry] = []
@@ -35,13 +37,6 @@ class Search:
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
         self._missed = 0.0  # goals' residual with which a search ends, metres
-        self._best: LocalSolution | None = None
-
-    @property
-    def best(self) -> LocalSolution:
-        """The best posture so far."""
-        assert self._best is not None
-        return self._best
 
     @property
     def _left(self) -> int:
@@ -61,7 +56,7 @@ class Search:
         local = self._through_things(start, "feasibility")
         if local is None or local.violation.worst > self.settings.tolerance or not self.settings.measures:
             return local
-        self._accept(local, "by feasibility first")
+        self.accept(local, "by feasibility first")
         return self._descend(local.q)
 
     def _through_things(self, start: Array, note: str) -> LocalSolution | None:
@@ -119,13 +114,15 @@ class Search:
             self._near = local
         return local
 
-    def _accept(self, local: LocalSolution, how: str) -> bool:
-        """Keep the better one; whether the problem is solved now."""
-        if self._best is None or better(local, self._best, self.settings):
-            self._best, self.how = local, how
-        return self._ends(self.best)
+    def better(self, one: LocalSolution, other: LocalSolution) -> bool:
+        """See `Multistart.better`."""
+        return better(one, other, self.settings)
 
-    def _ends(self, local: LocalSolution, share: float = 1.0) -> bool:
+    def enough(self) -> bool:
+        """See `Multistart.enough`."""
+        return self._left < 0
+
+    def solves(self, end: LocalSolution, share: float = 1.0) -> bool:
         """Whether a search is over at this end, with the constraints and goals missed by `share` tolerances at most."""
         enough = share * self.settings.tolerance
-        return broken(local) <= enough and local.violation.left <= self._missed + enough
+        return broken(end) <= enough and end.violation.left <= self._missed + enough

@@ -79,14 +79,12 @@ class DescentNumbers(NamedTuple):
     # reach.
     least_gain: float = 1e-3
     least_gain_alone: float = 1e-7
-    restorable: float = 0.03  # m, rad: violation that the next step is trusted to repair. Larger: more taken back.
     near_met: float = 1e-4  # m, rad. Residuals below which multipliers act. Larger: they act on what has other causes.
     width: float = 0.02  # of the funnel at first. Wider: longer steps along constraints, more to restore.
     switch: float = 10.0  # times the squared violation that measures lead above. Smaller: they lead far from the goals.
     worth: float = 0.05  # share of the predicted reduction that a step must achieve. Larger: more steps rejected.
     good: float = 0.5  # share above which the next step may be longer
     poor: float = 0.25  # share below which it must be shorter
-    along: float = 3.0  # tangential parts that a step is where they grow. Larger: faster down, rejected more often.
     # rad, m: distance of a bound below which motion to it is tangential. Larger: steps to joint limits count as met
     # goals; much smaller: joints that a bound stops bend the normal part.
     room: float = 1e-3

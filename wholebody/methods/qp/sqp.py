@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.methods.qp.active_set import parts_of
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Stage, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import Multipliers, QPSolution, QuadraticProgram, StepSize
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import lagrangian, multipliers_of
-from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.terms.linearisation import Linearisation
 
 LEAST_RADIUS = 1e-7
@@ -40,8 +40,6 @@ class SQP(Stage):
         self._radius, self._full_step = DESCENT.first_radius, self.full_step
         self._damping = DESCENT.full_step_damping[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
-        self._watched: Iterate | None = None  # where to return if a tentative step is not repaired
-        self._ahead = Extrapolation()
         self._unimproved = 0  # feasible postures in a row that are hardly better than the best
         self._kept: Iterate | None = None  # best feasible posture
         self._gain = 1.0  # share of its tangential part that a step has
@@ -82,9 +80,6 @@ class SQP(Stage):
             if there is not None:
                 here = there
                 self._keep(here)
-            elif self._watched is not None:
-                here, self._watched = self._watched, None
-        here = here if self._watched is None else self._watched
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return self.ended(here, converged, count)
@@ -104,8 +99,7 @@ class SQP(Stage):
         """Continue from a feasible posture with a narrower funnel."""
         self._width *= 0.3  # 0.5 ends at infeasible postures again; 0.1 makes steps along contacts tiny
         self._radius, self._gain, self._damping = DESCENT.first_radius, 1.0, 0.0
-        self._shift, self._watched = np.zeros_like(self._shift), None
-        self._ahead.reset()
+        self._shift = np.zeros_like(self._shift)
         return kept
 
     def _keep(self, here: Iterate) -> None:
@@ -194,38 +188,19 @@ class SQP(Stage):
         return violation.worst > self.tolerance or step.saves <= self.tolerance * (1.0 + abs(here.at.measure))
 
     def _advance(self, here: Iterate, program: QuadraticProgram, step: Step) -> Iterate | None:
-        """Go where the program says, or farther, as the last steps extrapolate; None if neither is accepted."""
-        if step.parts is None:
-            self._ahead.reset()
-        fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
-        if fast is not None:
-            leap = self.moved(here, fast)
-            acceptance = StepAcceptance(False, False, False, "undefined")
-            if leap is not None:
-                acceptance = self._judge(here, leap, step)
-            if leap is not None and acceptance.accepted and not self.jumps(here, leap):
-                self.record(leap, "accelerated")
-                return self._take(here, leap, program, step, fast, acceptance)
-            self._ahead.rejected()
-        dq = step.dq
-        there = self.moved(here, dq)
+        """Go where the program says; None if that is not accepted."""
+        there = self.moved(here, step.dq)
         if there is None:
-            self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
+            self._reject(float(np.abs(step.dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
-        watched = not acceptance.accepted and self._is_tentative(here, there)
-        if (acceptance.accepted or watched) and self.jumps(here, there):
-            acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
-        self.record(there, "tentative" if watched else acceptance.by)
-        if watched:
-            self._watched = here
-            self._ahead.reset()
-            self._shift = np.zeros_like(self._shift)
-            return there
+        if acceptance.accepted and self.jumps(here, there):
+            acceptance = StepAcceptance(False, False, False, "blocked")
+        self.record(there, acceptance.by)
         if not acceptance.accepted:
             self._reject(there.longest, acceptance.by)
             return None
-        return self._take(here, there, program, step, dq, acceptance)
+        return self._take(here, there, program, step, acceptance)
 
     def _reject(self, longest: float, by: str) -> None:
         """Shorten the next step after one with this longest entry was rejected."""
@@ -240,12 +215,10 @@ class SQP(Stage):
             self._radius = 0.3 * min(longest, self._radius)
             self._damping = max(0.3, 2.0 * self._damping)
         self._shift = np.zeros_like(self._shift)
-        self._ahead.reset()
 
     def _take(
-        self, here: Iterate, there: Iterate, program: QuadraticProgram, step: Step, way: Array,
-        acceptance: StepAcceptance,
-    ) -> Iterate:  # fmt: skip
+        self, here: Iterate, there: Iterate, program: QuadraticProgram, step: Step, acceptance: StepAcceptance
+    ) -> Iterate:
         """Accept a step, and adapt the radius and the share of the next."""
         # The residual that the measures cause is asked for in the next one (method of multipliers).
         if self._full_step and there.violation.total > (1.0 - DESCENT.full_step_gain) * here.violation.total:
@@ -262,9 +235,6 @@ class SQP(Stage):
             self._gain *= 0.5
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
-        self._watched = None
-        if step.parts is not None and not step.flat:
-            self._ahead.record(step.parts, way, way is not step.dq)
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
         self._shift = residual if np.abs(residual).max(initial=0.0) < DESCENT.near_met else np.zeros_like(residual)
@@ -288,23 +258,11 @@ class SQP(Stage):
         there.rows.soft_error[: there.rows.goals] -= self.offset
         return with_values(there, violation=self.shared.subproblem.violation(there.rows))
 
-    def _is_tentative(self, here: Iterate, there: Iterate) -> bool:
-        """Whether a rejected step reduced the goal errors and violates constraints little (watchdog)."""
-        if self._watched is not None or not self.measures:
-            return False
-        broken = max(there.violation.elastic, there.violation.hold)
-        return there.violation.goal < here.violation.goal and broken < DESCENT.restorable
-
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
-        """Judge a step, or two if the first one was tentative: then both together must be acceptable."""
-        predicted, before = step.predicted, here
-        if self._watched is not None:
-            before = self._watched
-            least = max(0.1 * predicted.violation, 1e-3 * before.violation.total)
-            predicted = with_values(predicted, violation=least)
+        """Judge a step by the measures, near the goals by the Lagrangian."""
         measures = [
             one.at.measure if step.multipliers is None else lagrangian(step.multipliers, one.at.measure, one.rows)
-            for one in (before, there)
+            for one in (here, there)
         ]
-        values = (before.violation.total, measures[0]), (there.violation.total, measures[1])
-        return judge(*values, predicted, self._width if self.measures else None)
+        values = (here.violation.total, measures[0]), (there.violation.total, measures[1])
+        return judge(*values, step.predicted, self._width if self.measures else None)
