@@ -39,7 +39,7 @@ PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
 AGAIN = 0.45  # of the time limit: for shorter paths; more = shorter, later
-STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
+STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
 POLISHED = 0.6  # of the time limit: the shortest path is drawn tight again until then
@@ -217,7 +217,8 @@ class _Search:
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
         self._bodily = free_root and self._local is not self._slides
-        self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
+        # narrow places are got through by turns of the root sooner than by those of limbs, and sooner than by steps
+        self._spreads = (0.0, 0.0, 0.0, 0.1) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
         self._straight, self._until = False, AGAIN
 
@@ -245,14 +246,18 @@ class _Search:
             long = self._local is not self._slides and not self._bodily and most > LONG * straight
             self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
-            before = np.inf
-            while self._local is not self._slides and most < TIGHT * before and BUDGET.spent < POLISHED:
+            straight = STRAIGHT * self._bodily
+            while self._local is not self._slides and BUDGET.spent < POLISHED:
                 # most of the remaining time is for smoothing
                 with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
-                    if self._bodily:
-                        best = shortcut(model, best, self._local, self._rng, True)
-                    best = tighten(model, best, self._local, self._slides)
-                before, most = most, length(model, best)
+                    path = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
+                    path = tighten(model, path, self._local, self._slides, straight)
+                before, most = most, min(most, found := length(model, path))
+                best = path if found < before else best
+                if most > TIGHT * before:
+                    if not straight:
+                        break
+                    straight = 0
             return best, f"the shortest of {runs} searches"
         if not self._reached:
             late = "" if BUDGET.spent < SEARCHED else " was found in time that"
@@ -269,7 +274,7 @@ class _Search:
         self._straight = False
         sliding = self._problem.scene.figure.roots and self._local is not self._slides
         trees = RRTConnect(
-            self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
+            self._local, self._slides if sliding else None, model, start
         )
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
