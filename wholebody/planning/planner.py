@@ -26,7 +26,7 @@ from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
 from wholebody.planning.ends import End, answers, nearer
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
-from wholebody.planning.rrt_connect import RRTConnect
+from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import length, resampled, shortcut, smooth, tighten
 from wholebody.planning.timing import Pace, Timing
@@ -39,6 +39,7 @@ PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
 AGAIN = 0.45  # of the time limit: for shorter paths; more = shorter, later
+STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
@@ -217,8 +218,7 @@ class _Search:
         self._said = ""
         free_root = bool(problem.scene.figure.roots) and not holds(problem)
         self._bodily = free_root and self._local is not self._slides
-        # narrow places are got through by turns of the root sooner than by those of limbs, and sooner than by steps
-        self._spreads = (0.0, 0.0, 0.0, 0.1) * free_root + (0.1, 0.3, 1.0)
+        self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
         self._straight, self._until = False, AGAIN
 
@@ -274,7 +274,7 @@ class _Search:
         self._straight = False
         sliding = self._problem.scene.figure.roots and self._local is not self._slides
         trees = RRTConnect(
-            self._local, self._slides if sliding else None, model, start
+            self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
         )
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
@@ -303,13 +303,19 @@ class _Search:
             # Half of the samples are at an end: bodies leave narrow places as they are.
             share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
             middle = np.asarray(pin.interpolate(model, start, near, share))
-            sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
+            sample = self._sampler.near(middle, self._spread(trees.samples))
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
             path = trees.grow(sample)
             if path is not None:
                 return path, trees
         return None, trees
+
+    def _spread(self, samples: int) -> float:
+        """Of the next of so many samples; bodies get through most narrow places sooner if the root alone turns."""
+        if self._bodily and samples < GEODESICS:
+            return max(0.0, self._rng.uniform(-0.1, 0.1))
+        return self._spreads[self._rng.integers(len(self._spreads))]
 
     def _led(self, end: Array) -> list[Array]:
         """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.

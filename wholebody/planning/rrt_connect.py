@@ -8,8 +8,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
-STRAIGHT = 150  # samples that geodesics alone lead to; more = shorter paths, later where these find none
-STEPPED = 4  # samples after them of which one is stepped towards, which costs as much as thirty geodesics
+GEODESICS = 150  # samples that geodesics alone lead to; more = shorter paths, later where these find none
 
 
 class Tree:
@@ -62,9 +61,11 @@ class RRTConnect:
         samples: how many they were extended towards.
     """
 
-    def __init__(self, local: LocalPlanner, slides: TrackedMotions | None, model: pin.Model, start: Array) -> None:
-        """Take the posture (nq,) at which the motion begins."""
-        self._local, self._slides = local, slides
+    def __init__(
+        self, local: LocalPlanner, slides: TrackedMotions | None, model: pin.Model, start: Array, every: int
+    ) -> None:  # fmt: skip
+        """Take the posture (nq,) at which the motion begins; `every` how many samples steps are tried once."""
+        self._local, self._slides, self._every = local, slides, every
         self._trees = [Tree(model, start, local.shares), Tree(model, start, local.shares)]
         self._trees[0].add(start)
         self.samples = 0
@@ -83,7 +84,7 @@ class RRTConnect:
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)
         there = 1 - here
-        stepped = self.samples > STRAIGHT and self.samples % STEPPED == 0
+        stepped = self.samples > GEODESICS and self.samples % self._every == 0
         number, _ = self._extend(self._trees[here], sample, self._slides if stepped else None)
         if number is None:
             return None
