@@ -33,6 +33,7 @@ MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 MISSED = 5e-5  # m, rad: by which motions may miss clearances and constraints; a frame may by twice as much
 PARTS = 400  # most of one motion that are tested, as what slides along something else would be halved on and on
+KNOWN = 128  # postures that are remembered, as those of a path are looked at again and again
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
 LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
@@ -73,6 +74,7 @@ class Geodesics:
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
+        self._known: dict[tuple[bytes, bool], Seen | None] = {}
         self._clearance = problem.clearance
         self.partial = True
         self._least = np.full(len(workspace.table.pairs), problem.clearance)
@@ -109,6 +111,7 @@ class Geodesics:
 
     def admit(self, q: Array) -> None:
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
+        self._known.clear()
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
         number, distance = near.number, near.distance - NOISE
         required = np.minimum((self._least + self._kept.room)[number], distance)
@@ -191,7 +194,15 @@ class Geodesics:
 
     def _seen(self, q: Array, kept: Kept | None = None) -> Seen | None:
         """What is seen at a posture (nq,); None where a pair is nearer than is required, or a constraint is missed."""
-        sides, required = kept or self._kept
+        kept = kept or self._kept
+        key = q.tobytes(), kept is self._kept
+        if key not in self._known:
+            if len(self._known) >= KNOWN:
+                self._known.clear()
+            self._known[key] = self._looked(q, *kept)
+        return self._known[key]
+
+    def _looked(self, q: Array, sides: Array, required: Array) -> Seen | None:
         proximity, state = self._workspace.proximity, self._workspace.state.update(q)
         values = self._values.at(state)
         if (values < sides[0]).any() or (values > sides[1]).any():

@@ -42,8 +42,8 @@ AGAIN = 0.45  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
-LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
-POLISHED = 0.6  # of the time limit: the shortest path is drawn tight again until then
+LATER = (0.65, 0.55)  # of the time limit: as AGAIN, for long paths of arms, and of bodies, whose polishing takes longer
+POLISHED = 0.65  # of the time limit: the shortest path is drawn tight again until then
 TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
@@ -236,24 +236,24 @@ class _Search:
                 return path, "the straight motion"
             with self._judge.in_time(path):
                 # limbs that move evenly cost as much as five other shortcuts
-                path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
+                path = shortcut(model, path, self._local, self._rng, self._local.partial)
                 path = nearer(self._problem, path, self._local, self._sampler)
             if (found := length(model, path)) < most:
                 best, most = path, found
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
-            long = self._local is not self._slides and not self._bodily and most > LONG * straight
-            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
+            long = self._local is not self._slides and most > LONG * straight
+            self._until, enough = (LATER[self._bodily], np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
             straight = STRAIGHT * self._bodily
             while self._local is not self._slides and BUDGET.spent < POLISHED:
                 # most of the remaining time is for smoothing
                 with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
-                    path = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
-                    path = tighten(model, path, self._local, self._slides, straight)
-                before, most = most, min(most, found := length(model, path))
-                best = path if found < before else best
+                    short = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
+                    tight = tighten(model, short, self._local, self._slides, straight)
+                best = min(best, short, tight, key=lambda path: length(model, path))
+                before, most = most, length(model, best)
                 if most > TIGHT * before:
                     if not straight:
                         break
@@ -362,7 +362,7 @@ class _Judge:
         figure = self.problem.scene.figure
         steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
         fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
-        return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.6 * fastest) / self._pace.dt, 1e-9))
+        return within_budget(max(BUDGET.left - self._frame * (0.6 + 2.0 * fastest) / self._pace.dt, 1e-9))
 
     def judged(self, path: Array) -> Plan:
         """The motion along a path (m, nq) as fast as the limits allow, and its figures."""

@@ -19,6 +19,7 @@ LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves ev
 APART = 0.35  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
 OVERSHOOT = 1.6  # of the distance to its neighbours' mean that a posture moves; 1 = converges in twice as many sweeps
 DRAWN = 0.15  # rad, m: by which a posture is drawn to the straight motion in a sweep; more = fewer of them are free
+NEARER = 0.3  # of its distance: by which a posture far from the straight motion is drawn to it
 SWEPT = 0.99  # of its length before a sweep: where it is longer after one, a path counts as tight
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
 
@@ -104,7 +105,7 @@ def tighten(
 def _towards(model: pin.Model, q: Array, line: Array) -> Array:
     """The posture (nq,) on the geodesic from q to another one that is at most `DRAWN` away."""
     far = float(np.linalg.norm(pin.difference(model, q, line)))
-    return np.asarray(pin.interpolate(model, q, line, min(1.0, DRAWN / max(far, 1e-15))))
+    return np.asarray(pin.interpolate(model, q, line, min(1.0, max(DRAWN / max(far, 1e-15), NEARER))))
 
 
 def _swept(
