@@ -293,7 +293,7 @@ def test_steps_along_a_wall_from_the_end_find_the_way_that_steps_from_the_start_
     free_bodies: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch, least_distance: Distance
 ) -> None:
     """A ball behind a wall is drawn along it past its edge; from the other side it is drawn to the wall's middle."""
-    monkeypatch.setattr("wholebody.planning.planner.RRTConnect", NoTrees)
+    monkeypatch.setattr("wholebody.planning.search.RRTConnect", NoTrees)
     figure = free_bodies(wb.Sphere(0.1))
     scene = wb.Scene(figure).add(wb.Box((0.1, 2.0, 4.0)), name="wall")
     beside, behind = np.array((-0.3, 1.2, 0.0)), np.array((0.3, 0.5, 0.0))  # the wall's edge is at y = 1

@@ -210,9 +210,7 @@ class Geodesics:
         room = proximity.least(state.data, WITHIN) - self._least
         return Seen(room, proximity.distances.placed.copy()) if (room >= required).all() else None
 
-    def _joins(
-        self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None, kept: Kept | None = None
-    ) -> bool:
+    def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None, kept: Kept | None = None) -> bool:
         """Whether the motion by a tangent (nv,) from q (nq,) is free, by halves, the longest ones first.
 
         With c the chord of a pair's motion against each other and A a bound of its acceleration, the least room on the

@@ -111,7 +111,7 @@ def _towards(model: pin.Model, q: Array, line: Array) -> Array:
 def _swept(
     model: pin.Model, band: list[Array], planners: tuple[LocalPlanner, TrackedMotions], goals: list[Array]
 ) -> list[Array]:
-    """Postures of a band, each as near to its goal as it can be in one step; without goals to between its neighbours."""
+    """Postures of a band, each nearer to its goal by a step; without goals to between its neighbours."""
     found = band[:1]
     for k, (q, after) in enumerate(pairwise(band[1:]), start=1):
         goal = goals[k] if goals else _between(model, found[-1], q, after)
@@ -132,7 +132,7 @@ def _brought(
     if local.joined(before, goal, np.inf) and local.joined(goal, after, np.inf):
         return [goal]
     slid = slides.step(q, goal)
-    sides = []
+    sides = list[list[Array]]()
     for side in (before, after):
         if local.joined(side, slid, np.inf):
             sides.append([])
@@ -165,13 +165,28 @@ def _lengths(model: pin.Model, path: Sequence[Array]) -> Array:
 
 def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
     """Postures (count, nq) at equal lengths on a path."""
-    steps = [np.asarray(pin.difference(model, *pair)) for pair in pairwise(path)]
     at = _lengths(model, path)
+    return _at(model, path, at, np.linspace(0.0, at[-1], count))
+
+
+def refined(model: pin.Model, path: Sequence[Array], count: int) -> Array:
+    """About so many postures (n, nq) on a path, at nearly equal lengths, its own ones among them: no corner is cut."""
+    at = _lengths(model, path)
+    even = np.linspace(0.0, at[-1], count)
+    nearest = np.rint(at[1:-1] / max(even[1], 1e-15)).astype(int)
+    kept = np.delete(even, np.unique(nearest[(nearest > 0) & (nearest < count - 1)]))
+    places = np.sort(np.concatenate([kept, at[1:-1]]))
+    apart = np.diff(places, prepend=-1.0) > 1e-9
+    return _at(model, path, at, places[apart])
+
+
+def _at(model: pin.Model, path: Sequence[Array], at: Array, places: Array) -> Array:
+    """Postures (n, nq) at places (n,) on a path whose postures are at others; the first and the last are its ends."""
     found = []
-    for place in np.linspace(0.0, at[-1], count)[1:-1]:
-        gap = int(np.clip(np.searchsorted(at, place, side="right") - 1, 0, len(steps) - 1))
+    for place in places[1:-1]:
+        gap = int(np.clip(np.searchsorted(at, place, side="right") - 1, 0, len(at) - 2))
         part = (place - at[gap]) / max(at[gap + 1] - at[gap], 1e-15)
-        found.append(np.asarray(pin.integrate(model, path[gap], part * steps[gap])))
+        found.append(np.asarray(pin.interpolate(model, path[gap], path[gap + 1], min(part, 1.0))))
     return np.array([path[0], *found, path[-1]])
 
 
@@ -225,7 +240,11 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
         anew = near > 0.01 * near.max()
         share -= 0.6 * share * np.where(anew, near / near.max(), 0.0)
     # width of the filter of the remaining corners, points; larger = rounder, less exact
-    rounded, cut = local.settled(_postures(model, path, _filtered(places(model, found), 2.0)))
+    free = places(model, found)
+    wide, beside = _filtered(free, 2.0), np.convolve(blocked, np.ones(10), "same") > 0.0
+    stays = np.concatenate([[False], beside]) | np.concatenate([beside, [False]])
+    # what is not proven free there is as the path was before, and stays so
+    rounded, cut = local.settled(_postures(model, path, np.where(stays[:, None], free, wide)))
     if BUDGET.over:
         return path
     return found if (cut & ~blocked).any() else rounded
