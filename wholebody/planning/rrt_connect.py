@@ -8,7 +8,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
-GEODESICS = 150  # samples that geodesics alone lead to; more = shorter paths, later where these find none
+GEODESICS = 100  # samples that geodesics alone lead to; more = shorter paths, later where these find none
 
 
 class Tree:

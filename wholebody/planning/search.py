@@ -19,12 +19,13 @@ from wholebody.planning.smoothing import length, shortcut, tighten
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
-AGAIN = 0.45  # of the time limit: for shorter paths; more = shorter, later
+AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
-LATER = (0.65, 0.55)  # of the time limit: as AGAIN, for long paths of arms, and of bodies, whose polishing takes longer
+LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
 POLISHED = 0.65  # of the time limit: the shortest path is drawn tight again until then
 STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
+SMOOTHED = 0.2  # s: left for smoothing where a path is drawn tight on; a body's takes as long
 TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
 
 
@@ -73,13 +74,18 @@ class Search:
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
-            long = self._local is not self._slides and most > LONG * straight
-            self._until, enough = (LATER[self._bodily], np.inf) if long else (AGAIN, self._local.samples)
+            long = self._local is not self._slides and not self._bodily and most > LONG * straight
+            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
             straight = STRAIGHT * self._bodily
             while self._local is not self._slides and BUDGET.spent < POLISHED:
+                with self._in_time(best):
+                    left = BUDGET.left
+                # a path that there is no time to smooth stops at its corners, and is judged three times as long
+                if left < SMOOTHED:
+                    break
                 # most of the remaining time is for smoothing
-                with self._in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
+                with within_budget(0.3 * left):
                     short = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
                     tight = tighten(model, short, self._local, self._slides, straight)
                 best = min(best, short, tight, key=lambda path: length(model, path))
