@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.audits.plan_scenes import hand_into_box
+from tests.audits.plan_scenes import hand_into_box, person_at_gap
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan
@@ -20,7 +20,7 @@ from wholebody.planning.ends import nearer
 from wholebody.planning.local_planner import Geodesics, TrackedMotions
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
-from wholebody.planning.smoothing import length, shortcut, tighten
+from wholebody.planning.smoothing import length, refined, shortcut, tighten
 
 
 def shelf(number: int) -> tuple[wb.Problem, Array]:
@@ -170,6 +170,73 @@ def test_a_path_round_a_ball_is_drawn_tight(free_bodies: Callable[..., wb.Figure
     assert least_along(scene, np.array(found), least_distance) >= 0.0
 
 
+def test_steps_along_things_keep_what_always_holds() -> None:
+    """Reach cones are curved, so that steps along them miss them; by as much as frames may, no more."""
+    asked = person_at_gap(0)
+    problem = wb.Problem(asked.scene, asked.start)
+    sampler, missed = Sampler(problem, np.random.default_rng(0)), list[float]()
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        for _ in range(8):
+            way, _ = steps.towards(asked.start, sampler.near(asked.start, 1.0))
+            missed += [wb.assess(problem, q).constraint_violation for q in way]
+    assert len(missed) > 100
+    assert max(missed) < 1e-4
+
+
+def test_no_corner_of_a_path_is_cut_before_it_is_smoothed(planar_arm: Callable[..., wb.Figure]) -> None:
+    model, rng = planar_arm((0.5, 0.5)).model, np.random.default_rng(0)
+    path = list(np.cumsum(rng.uniform(-0.1, 0.1, (12, 2)), axis=0))
+    found = refined(model, path, 30)
+    at = [int(np.flatnonzero((found == q).all(axis=1))[0]) for q in path]
+    assert at == sorted(at)
+    assert (at[0], at[-1]) == (0, len(found) - 1)
+    assert length(model, list(found)) == pytest.approx(length(model, path), rel=1e-9)
+    steps = np.linalg.norm(np.diff(found, axis=0), axis=1)
+    assert steps.max() < 2.0 * length(model, path) / 29
+
+
+def test_between_ends_in_contact_nothing_is_gone_through(
+    free_bodies: Callable[..., wb.Figure], least_distance: Distance
+) -> None:
+    """Two balls touch at both ends, between which the straight motion is 1.5 mm deep."""
+    figure = free_bodies(wb.Sphere(0.1))
+    scene, angle = wb.Scene(figure).add(wb.Sphere(0.1), name="ball"), 0.1225
+    start, end = (
+        np.concatenate([[0.2 * np.cos(angle), side * 0.2 * np.sin(angle), 0.0], figure.neutral[3:]])
+        for side in (1.0, -1.0)
+    )
+    problem = wb.Problem(scene, start)
+    with problem.borrow() as workspace:
+        local = Geodesics(problem, workspace)
+        local.admit(start)
+        local.admit(end)
+        assert not local.joined(start, end, np.inf)
+    found = wb.plan(scene, start, end)
+    assert found.solved, found.message
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-4
+
+
+def test_a_motion_rests_at_corners_where_curves_fail(
+    free_bodies: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch, least_distance: Distance
+) -> None:
+    """Curves that go through a wall are given up, not the path that goes round it."""
+
+    def straight(model: Any, path: Any, _: Any) -> Array:
+        return np.linspace(path[0], path[-1], 20)
+
+    for name in ("refined", "smooth"):
+        monkeypatch.setattr(f"wholebody.planning.planner.{name}", straight)
+    figure = free_bodies(wb.Sphere(0.1))
+    scene = wb.Scene(figure).add(wb.Box((0.1, 2.0, 4.0)), name="wall")
+    start, end = (np.concatenate([(x, 0.9, 0.0), figure.neutral[3:]]) for x in (-0.3, 0.3))
+    found = wb.plan(scene, start, end)
+    check(found, start, end, Pace())
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+    speed = np.abs(np.diff(found.clip.q[:, :3], axis=0)).max(axis=1)
+    assert (speed[1:-1] < 1e-9).any()
+
+
 def test_the_same_seed_plans_the_same_motion() -> None:
     problem, end = shelf(9)
     first, second = (wb.plan(problem.scene, problem.start, end, seed=4).clip.q for _ in range(2))
@@ -293,7 +360,7 @@ def test_steps_along_a_wall_from_the_end_find_the_way_that_steps_from_the_start_
     free_bodies: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch, least_distance: Distance
 ) -> None:
     """A ball behind a wall is drawn along it past its edge; from the other side it is drawn to the wall's middle."""
-    monkeypatch.setattr("wholebody.planning.planner.RRTConnect", NoTrees)
+    monkeypatch.setattr("wholebody.planning.search.RRTConnect", NoTrees)
     figure = free_bodies(wb.Sphere(0.1))
     scene = wb.Scene(figure).add(wb.Box((0.1, 2.0, 4.0)), name="wall")
     beside, behind = np.array((-0.3, 1.2, 0.0)), np.array((0.3, 0.5, 0.0))  # the wall's edge is at y = 1

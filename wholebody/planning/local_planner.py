@@ -31,6 +31,9 @@ from wholebody.tracking.qp_strategy import Attraction
 WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
+MISSED = 5e-5  # m, rad: by which motions may miss clearances and constraints; a frame may by twice as much
+PARTS = 400  # most of one motion that are tested, as what slides along something else would be halved on and on
+KNOWN = 128  # postures that are remembered, as those of a path are looked at again and again
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
 JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
 LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
@@ -44,8 +47,15 @@ GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer m
 class Seen(NamedTuple):
     """What is seen at a posture that keeps the distances."""
 
-    room: Array  # (pairs,) by how much distances exceed what is required at least, metres
+    room: Array  # (pairs,) by how much distances exceed the least that motions keep, metres
     placed: Array  # (n, 4, 3) where the pieces are
+
+
+class Kept(NamedTuple):
+    """What is kept at a posture."""
+
+    sides: Array  # (2, c) of the values of constraints
+    room: Array  # (pairs,) beyond the least distances that motions keep, metres
 
 
 class Geodesics:
@@ -59,9 +69,10 @@ class Geodesics:
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
+        self._known: dict[tuple[bytes, bool], Seen | None] = {}
         self._clearance = problem.clearance
         self.partial = True  # whether one joint may move in another way than before, and all others as they did
-        self._required = problem.clearance + np.full(len(workspace.table.pairs), MARGIN)
+        self._least = np.full(len(workspace.table.pairs), problem.clearance)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
         # of every kind of pairs by every freedom
@@ -69,8 +80,13 @@ class Geodesics:
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv), pairs))
         state, terms = workspace.state.update(problem.start), problem.constraints
         self._values = ConstraintValues(terms, state)
-        sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
-        self._sides = np.hstack([np.zeros((2, 0)), *sides]) + INSIDE * np.array([[1.0], [-1.0]])
+        each = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
+        sides, inwards = np.hstack([np.zeros((2, 0)), *each]), np.array([[1.0], [-1.0]])
+        self._kept = Kept(sides + INSIDE * inwards, np.full(len(self._least), MARGIN))
+        # what is held is missed between two steps, and settled there
+        self._followed = Kept(
+            sides - (INSIDE if holds(problem) else MISSED) * inwards, np.full(len(self._least), 0.5 * MARGIN)
+        )
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
         if len(unbounded):
             names = [workspace.owners[piece] for piece in pairs[unbounded[0]]]
@@ -92,11 +108,18 @@ class Geodesics:
 
     def admit(self, q: Array) -> None:
         """Let motions be as near to things as the posture q (nq,) is, which is an end of the whole motion."""
+        self._known.clear()
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
-        self._required[near.number] = np.minimum(self._required[near.number], near.distance - NOISE)
+        number, distance = near.number, near.distance - NOISE
+        required = np.minimum((self._least + self._kept.room)[number], distance)
+        # nothing is nearer between two postures than at an end, but for what a frame may miss
+        self._least[number] = np.minimum(self._least[number], distance - MISSED)
+        self._kept.room[number] = required - self._least[number]
+        self._followed.room[number] = 0.5 * self._kept.room[number]
         values = self._values.at(self._workspace.state)
-        self._sides[0] = np.minimum(self._sides[0], values - NOISE)
-        self._sides[1] = np.maximum(self._sides[1], values + NOISE)
+        for kept in (self._kept, self._followed):
+            kept.sides[0] = np.minimum(kept.sides[0], values - NOISE)
+            kept.sides[1] = np.maximum(kept.sides[1], values + NOISE)
 
     def free(self, q: Array) -> bool:
         """Whether a posture (nq,) keeps the distances."""
@@ -145,19 +168,42 @@ class Geodesics:
             seen = ahead
         return path, blocked
 
+    def keeps(self, q: Array) -> bool:
+        """Whether a posture (nq,) misses no constraint by more than steps may."""
+        values, sides = self._values.at(self._workspace.state.update(q)), self._followed.sides
+        return bool((values >= sides[0]).all() and (values <= sides[1]).all())
+
+    def follows(self, q: Array, there: Array) -> bool:
+        """Whether a step of a tracker from q to a posture (nq,) is free, and misses nothing on the way.
+
+        It ends at the margin and at bounds, which it misses as both are curved, so half of the margin is enough.
+        """
+        motion, kept = np.asarray(pin.difference(self._model, q, there)), self._followed
+        middle = self._seen(np.asarray(pin.integrate(self._model, q, 0.5 * motion)), kept)
+        return middle is not None and self._joins(q, motion, self._seen(q, kept), self._seen(there, kept), kept)
+
     def _parts(self, motion: Array) -> int:
         return max(1, int(np.ceil(np.abs(motion).max(initial=0.0) / 0.2)))  # rad, m: length of a part of a motion
 
-    def _seen(self, q: Array) -> Seen | None:
+    def _seen(self, q: Array, kept: Kept | None = None) -> Seen | None:
         """What is seen at a posture (nq,); None where a pair is nearer than is required, or a constraint is missed."""
+        kept = kept or self._kept
+        key = q.tobytes(), kept is self._kept
+        if key not in self._known:
+            if len(self._known) >= KNOWN:
+                self._known.clear()
+            self._known[key] = self._looked(q, *kept)
+        return self._known[key]
+
+    def _looked(self, q: Array, sides: Array, required: Array) -> Seen | None:
         proximity, state = self._workspace.proximity, self._workspace.state.update(q)
         values = self._values.at(state)
-        if (values < self._sides[0]).any() or (values > self._sides[1]).any():
+        if (values < sides[0]).any() or (values > sides[1]).any():
             return None
-        room = proximity.least(state.data, WITHIN) - self._required
-        return Seen(room, proximity.distances.placed.copy()) if room.min(initial=0.0) >= 0.0 else None
+        room = proximity.least(state.data, WITHIN) - self._least
+        return Seen(room, proximity.distances.placed.copy()) if (room >= required).all() else None
 
-    def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None) -> bool:
+    def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None, kept: Kept | None = None) -> bool:
         """Whether the motion by a tangent (nv,) from q (nq,) is free, by halves, the longest ones first.
 
         With c the chord of a pair's motion against each other and A a bound of its acceleration, the least room on the
@@ -167,17 +213,18 @@ class Geodesics:
         """
         if seen is None or ahead is None:
             return False
-        most, least = np.abs(motion), self._required - MARGIN
+        most = np.abs(motion)
         bent = self._views * ((self._turning @ most) * (self._bending @ most))[:, None]
         asked = [(q, motion, seen, ahead, (self._approach @ most)[self._kind], bent[self._kind])]
         for here, whole, first, last, far, bent in asked:  # grows while it is read
-            room = first.room + last.room + 2.0 * MARGIN
-            if kept_apart(self._workspace.table, first.placed, last.placed, (room, far, bent, least)):
+            if kept_apart(
+                self._workspace.table, first.placed, last.placed, (first.room + last.room, far, bent, self._least)
+            ):
                 continue
             half = 0.5 * whole
             middle = np.asarray(pin.integrate(self._model, here, half))
-            between = self._seen(middle)
-            if between is None:
+            between = self._seen(middle, kept)
+            if between is None or len(asked) > PARTS:
                 return False
             asked += [
                 (here, half, first, between, 0.5 * far, 0.25 * bent),
@@ -253,18 +300,24 @@ class TrackedMotions:
         if self._held:
             self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
         while left > REACHED:
-            here, before, q = q, rest, self._tracker.step(q).q
+            here, before, q = q, rest, self._stepped(q)
             left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target, factors)
-            if (rest > before - GAIN and left > REACHED) or gone + left > most or BUDGET.over:
+            slow = rest > before - GAIN and left > REACHED
+            if slow or gone + left > most or BUDGET.over or not self.geodesics.keeps(q):
                 return way, False
             way.append(q)
         return way, True
+
+    def _stepped(self, q: Array) -> Array:
+        """The posture (nq,) of one step; of another one, which meets constraints alone, where that misses them."""
+        found: Array = self._tracker.step(q).q
+        return found if self.geodesics.keeps(found) else self._settling.step(found, measures=False).q
 
     def step(self, q: Array, target: Array) -> Array:
         """The posture (nq,) of one step from q towards a target, in which all freedoms count alike, as in lengths."""
         self._attraction.weigh(np.ones(self._model.nv))
         self._attraction.toward(target)
-        found: Array = self._tracker.step(q).q
+        found = self._stepped(q)
         self._attraction.weigh(self.shares**2)
         return found
 

@@ -5,7 +5,7 @@ ends -> straight motion, else steps along things, else two trees -> shortcuts ->
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -24,12 +24,12 @@ from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
-from wholebody.planning.ends import End, answers, nearer
+from wholebody.planning.ends import answers
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
-from wholebody.planning.rrt_connect import RRTConnect
 from wholebody.planning.sampling import Sampler, holds
-from wholebody.planning.smoothing import length, resampled, shortcut, smooth, tighten
-from wholebody.planning.timing import Pace, Timing
+from wholebody.planning.search import Search
+from wholebody.planning.smoothing import length, refined, resampled, smooth
+from wholebody.planning.timing import Pace, Timing, used
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal
@@ -37,13 +37,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
-SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
-AGAIN = 0.45  # of the time limit: for shorter paths; more = shorter, later
-STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
-LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
-LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
-POLISHED = 0.6  # of the time limit: the shortest path is drawn tight again until then
-TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
+CORNERED = 12  # postures of each straight part of a path with corners; more = sooner at the end, dearer
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
     "wholebody.methods.qp.active_set",
@@ -147,7 +141,7 @@ def plan(
             tracked = holds(problem) or bool(problem.bounds or scene.figure.followers)
             slides = TrackedMotions(problem, workspace)
             local: LocalPlanner = slides if tracked else slides.geodesics
-            search = _Search(judge, (local, slides), ends, (sampler, rng))
+            search = Search(problem, judge.in_time, (local, slides), ends, (sampler, rng))
             while found is None or not (found.solved or BUDGET.over):
                 path, message = search.shortest()
                 if path is None:
@@ -199,133 +193,22 @@ def _moved(problem: Problem, q: Array) -> float:
     return float(np.max([np.abs(pin.difference(model, problem.start, each)[still]).max() for each in q]))
 
 
-class _Search:
-    """The search for paths from the start of a problem to its ends."""
-
-    def __init__(
-        self,
-        judge: _Judge,
-        planners: tuple[LocalPlanner, TrackedMotions],
-        ends: Iterator[End],
-        random: tuple[Sampler, np.random.Generator],
-    ) -> None:
-        self._judge, self._ends, self._begun = judge, ends, False
-        problem = self._problem = judge.problem
-        self._local, self._slides = planners
-        self._sampler, self._rng = random
-        self._reached: list[Array] = []
-        self._said = ""
-        free_root = bool(problem.scene.figure.roots) and not holds(problem)
-        self._bodily = free_root and self._local is not self._slides
-        self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
-        self._slides.admit(problem.start)
-        self._straight, self._until = False, AGAIN
-
-    def shortest(self) -> tuple[list[Array] | None, str]:
-        """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
-        model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
-        enough: float = self._local.samples
-        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
-            # other motions are shorter than this share of the best one
-            path, trees = self._path(0.95 * most, np.inf if not runs else enough - samples)
-            runs, samples = runs + 1, samples + trees.samples * (runs > 0)
-            if path is None:
-                break
-            if self._straight:
-                return path, "the straight motion"
-            with self._judge.in_time(path):
-                # limbs that move evenly cost as much as five other shortcuts
-                path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
-                path = nearer(self._problem, path, self._local, self._sampler)
-            if (found := length(model, path)) < most:
-                best, most = path, found
-                if not any(np.array_equal(path[-1], q) for q in self._reached):
-                    self._reached.append(path[-1])
-            straight = min(self._apart(self._problem.start, q) for q in self._reached)
-            long = self._local is not self._slides and not self._bodily and most > LONG * straight
-            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
-        if best is not None:
-            before = np.inf
-            while self._local is not self._slides and most < TIGHT * before and BUDGET.spent < POLISHED:
-                # most of the remaining time is for smoothing
-                with self._judge.in_time(best), within_budget(max(0.3 * BUDGET.left, 1e-9)):
-                    if self._bodily:
-                        best = shortcut(model, best, self._local, self._rng, True)
-                    best = tighten(model, best, self._local, self._slides)
-                before, most = most, length(model, best)
-            return best, f"the shortest of {runs} searches"
-        if not self._reached:
-            late = "" if BUDGET.spent < SEARCHED else " was found in time that"
-            return None, f"no posture{late} meets the goals: {self._said}"
-        return None, "no motion was found within the time limit"
-
-    def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
-        """A path from the start to an end by trees, grown towards so many samples, shorter than `most` [rad, m]."""
-        # samples through which no such path goes are left out (anytime RRTs, Ferguson and Stentz 2006)
-        start, model, rounds = self._problem.start, self._problem.scene.model, 0
-        self._straight = False
-        sliding = self._problem.scene.figure.roots and self._local is not self._slides
-        trees = RRTConnect(
-            self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
-        )
-        ends = [q for q in self._reached if self._apart(start, q) < most]
-        for reached in ends:
-            trees.add_end(reached)
-        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else self._until) or not self._begun):
-            self._begun = True
-            if rounds % self._local.rounds == 0 or not ends:
-                q, why = next(self._ends, (None, ""))
-                if q is None and not why and not ends:
-                    break
-                if q is None and why:
-                    self._said = self._said or why
-                    continue
-                if q is not None:
-                    self._slides.admit(q)
-                    self._reached.append(q)
-                    if self._apart(start, q) < most:
-                        ends.append(q)
-                        if led := self._led(q):
-                            return led, trees
-                        trees.add_end(q)
-                if not ends:
-                    continue
-            rounds += 1
-            near = ends[self._rng.integers(len(ends))]
-            # Half of the samples are at an end: bodies leave narrow places as they are.
-            share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
-            middle = np.asarray(pin.interpolate(model, start, near, share))
-            sample = self._sampler.near(middle, self._spreads[self._rng.integers(len(self._spreads))])
-            if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
-                continue
-            path = trees.grow(sample)
-            if path is not None:
-                return path, trees
-        return None, trees
-
-    def _led(self, end: Array) -> list[Array]:
-        """Postures from the start to an end (nq,) without trees, if any: straight, or from the end back."""
-        start = self._problem.start
-        way, self._straight = self._local.towards(start, end)
-        if self._straight:
-            return [start, *way[:-1], end]
-        way, met = self._slides.towards(end, start)
-        return [start, *way[-2::-1], end] if met else []
-
-    def _apart(self, q: Array, other: Array) -> float:
-        return float(np.linalg.norm(pin.difference(self._problem.scene.model, q, other)))
-
-
 def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
-    """The motion along a smooth path beside a free one; along the free one itself where that one fails."""
+    """The motion along a smooth path beside a free one; along the free one itself where that one fails.
+
+    That has corners, so where a curve through it fails too, the motion rests at each of them.
+    """
     model = judge.problem.scene.model
     count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
     with judge.in_time(path):
-        even, _ = local.settled(resampled(model, path, count))
-        paths = smooth(model, even, local), even
-    plans = map(judge.judged, paths)
-    found = next(plans)
-    return found if found.solved or BUDGET.over else next(plans)
+        even, _ = local.settled(refined(model, path, count))
+        smoothed = smooth(model, even, local)
+    found = judge.judged([smoothed])
+    if not (found.solved or BUDGET.over):
+        found = judge.judged([even])
+    if not (found.solved or BUDGET.over):
+        found = judge.judged([local.settled(resampled(model, pair, CORNERED))[0] for pair in pairwise(path)])
+    return found
 
 
 class _Judge:
@@ -345,12 +228,16 @@ class _Judge:
         figure = self.problem.scene.figure
         steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
         fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
-        return within_budget(max(BUDGET.left - self._frame * (0.5 + 1.6 * fastest) / self._pace.dt, 1e-9))
+        left, judging = BUDGET.left, self._frame * (0.6 + 2.0 * fastest) / self._pace.dt
+        # shortcuts through a long path make it shorter, so that they have some time in any case
+        return within_budget(max(left - judging, 0.2 * left, 1e-9))
 
-    def judged(self, path: Array) -> Plan:
-        """The motion along a path (m, nq) as fast as the limits allow, and its figures."""
+    def judged(self, parts: Sequence[Array]) -> Plan:
+        """The motion along parts (m, nq) of a path as fast as the limits allow, each from rest to rest; its figures."""
         scene, pace = self.problem.scene, self._pace
-        q, use = Timing(scene.figure, path, pace).within()
+        # the last posture of a part is the first of the next one: a step of rest, in which no acceleration adds up
+        q = np.concatenate([Timing(scene.figure, part, pace).within() for part in parts])
+        use = used(scene.figure, q, pace)
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
         for frame in q:  # as far as the first that misses something
             if not worst <= KEPT or BUDGET.over:

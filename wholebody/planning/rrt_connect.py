@@ -8,6 +8,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
+GEODESICS = 100  # samples that geodesics alone lead to; more = shorter paths, later where these find none
+
 
 class Tree:
     """Postures that free motions join to its roots."""
@@ -75,7 +77,8 @@ class RRTConnect:
         self.samples += 1
         here = int(self._trees[1].grown < self._trees[0].grown)
         there = 1 - here
-        number, _ = self._extend(self._trees[here], sample, self._slides if self.samples % self._every == 0 else None)
+        stepped = self.samples > GEODESICS and self.samples % self._every == 0
+        number, _ = self._extend(self._trees[here], sample, self._slides if stepped else None)
         if number is None:
             return None
         # steps towards what is behind a thing end at it, and cost as much as ten geodesics

@@ -72,8 +72,8 @@ class Timing:
         found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 
-    def within(self) -> tuple[Array, Use]:
-        """The frames of the fastest timing whose differences keep the limits, and how much of these they use."""
+    def within(self) -> Array:
+        """The frames of the fastest timing whose differences keep the limits."""
         slower = 1.0
         for _ in range(10):  # a motion whose derivatives keep the limits is slowed until its frames do
             q = self.frames(slower)
@@ -82,7 +82,7 @@ class Timing:
             if over <= 1.0:
                 break
             slower *= 1.001 * over
-        return q, use
+        return q
 
 
 class Use(NamedTuple):

@@ -1,0 +1,176 @@
+"""The search for short paths from the start of a problem to its ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.methods.control import BUDGET, within_budget
+from wholebody.planning.ends import End, nearer
+from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
+from wholebody.planning.sampling import Sampler, holds
+from wholebody.planning.smoothing import length, shortcut, tighten
+from wholebody.problem import Problem
+
+SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
+AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
+STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
+LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
+LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
+POLISHED = 0.65  # of the time limit: the shortest path is drawn tight again until then
+STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
+SMOOTHED = 0.2  # s: left for smoothing where a path is drawn tight on; a body's takes as long
+TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
+
+
+class Search:
+    """The search for paths from the start of a problem to its ends."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        in_time: Callable[[list[Array]], AbstractContextManager[None]],
+        planners: tuple[LocalPlanner, TrackedMotions],
+        ends: Iterator[End],
+        random: tuple[Sampler, np.random.Generator],
+    ) -> None:
+        self._problem, self._in_time, self._ends, self._begun = problem, in_time, ends, False
+        self._local, self._slides = planners
+        self._sampler, self._rng = random
+        self._reached: list[Array] = []
+        self._said = ""
+        free_root = bool(problem.scene.figure.roots) and not holds(problem)
+        self._bodily = free_root and self._local is not self._slides
+        self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
+        self._slides.admit(problem.start)
+        self._straight, self._until = False, AGAIN
+
+    def shortest(self) -> tuple[list[Array] | None, str]:
+        """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
+        model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
+        paths: list[list[Array]] = []
+        enough: float = self._local.samples
+        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
+            # other motions are shorter than this share of the best one
+            path, trees = self._path(0.95 * most, np.inf if not runs else enough - samples)
+            runs, samples = runs + 1, samples + trees.samples * (runs > 0)
+            if path is None:
+                break
+            if self._straight and self._proven(path):
+                return path, "the straight motion"
+            with self._in_time(path):
+                # limbs that move evenly cost as much as five other shortcuts
+                path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
+                path = nearer(self._problem, path, self._local, self._sampler)
+            paths.append(path)
+            if (found := length(model, path)) < most:
+                best, most = path, found
+                if not any(np.array_equal(path[-1], q) for q in self._reached):
+                    self._reached.append(path[-1])
+            straight = min(self._apart(self._problem.start, q) for q in self._reached)
+            long = self._local is not self._slides and not self._bodily and most > LONG * straight
+            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
+        if best is not None:
+            straight = STRAIGHT * self._bodily
+            while self._local is not self._slides and BUDGET.spent < POLISHED:
+                with self._in_time(best):
+                    left = BUDGET.left
+                # a path that there is no time to smooth stops at its corners, and is judged three times as long
+                if left < SMOOTHED:
+                    break
+                # most of the remaining time is for smoothing
+                with within_budget(0.3 * left):
+                    short = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
+                    tight = tighten(model, short, self._local, self._slides, straight)
+                best = min(best, short, tight, key=lambda path: length(model, path))
+                before, most = most, length(model, best)
+                if most > TIGHT * before:
+                    if not straight:
+                        break
+                    straight = 0
+            paths = sorted([best, *paths], key=lambda path: length(model, path))
+            best = next((path for path in paths if self._proven(path)), None)
+        if best is not None:
+            return best, f"the shortest of {runs} searches"
+        if not self._reached:
+            late = "" if BUDGET.spent < SEARCHED else " was found in time that"
+            return None, f"no posture{late} meets the goals: {self._said}"
+        return None, "no motion was found within the time limit"
+
+    def _proven(self, path: list[Array]) -> bool:
+        """Whether all motions between the postures of a path are free and keep constraints, those by steps too."""
+        return all(self._slides.geodesics.follows(*pair) for pair in pairwise(path))
+
+    def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
+        """A path from the start to an end by new trees, which stay empty where it is straight.
+
+        The trees grow towards at most so many samples, through which a path can be shorter than `most`, radians and
+        metres (as in anytime RRTs, Ferguson and Stentz 2006).
+        """
+        start, model, rounds = self._problem.start, self._problem.scene.model, 0
+        self._straight = False
+        sliding = self._problem.scene.figure.roots and self._local is not self._slides
+        trees = RRTConnect(
+            self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
+        )
+        ends = [q for q in self._reached if self._apart(start, q) < most]
+        for reached in ends:
+            trees.add_end(reached)
+        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else self._until) or not self._begun):
+            self._begun = True
+            if rounds % self._local.rounds == 0 or not ends:
+                q, why = next(self._ends, (None, ""))
+                if q is None and not why and not ends:
+                    break
+                if q is None and why:
+                    self._said = self._said or why
+                    continue
+                if q is not None:
+                    self._slides.admit(q)
+                    self._reached.append(q)
+                    if self._apart(start, q) < most:
+                        ends.append(q)
+                        if led := self._led(q):
+                            return led, trees
+                        trees.add_end(q)
+                if not ends:
+                    continue
+            rounds += 1
+            near = ends[self._rng.integers(len(ends))]
+            # Half of the samples are at an end: bodies leave narrow places as they are.
+            share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
+            middle = np.asarray(pin.interpolate(model, start, near, share))
+            sample = self._sampler.near(middle, self._spread(trees.samples))
+            if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
+                continue
+            path = trees.grow(sample)
+            if path is not None:
+                return path, trees
+        return None, trees
+
+    def _spread(self, samples: int) -> float:
+        """Of the next of so many samples; bodies get through most narrow places sooner if the root alone turns."""
+        if self._bodily and samples < GEODESICS:
+            return max(0.0, self._rng.uniform(-0.1, 0.1))
+        return self._spreads[self._rng.integers(len(self._spreads))]
+
+    def _led(self, end: Array) -> list[Array]:
+        """Postures from the start to an end (nq,) without trees, if any: straight, or along things from the end back.
+
+        Most narrow places are around ends, and steps towards the start lead out of them.
+        """
+        start = self._problem.start
+        way, self._straight = self._local.towards(start, end)
+        if self._straight:
+            return [start, *way[:-1], end]
+        way, met = self._slides.towards(end, start)
+        return [start, *way[-2::-1], end] if met else []
+
+    def _apart(self, q: Array, other: Array) -> float:
+        return float(np.linalg.norm(pin.difference(self._problem.scene.model, q, other)))
