@@ -98,7 +98,7 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     yield with_values(_between(f"{name}:{SPREAD}", name, flesh, start, end), flesh=True)
     # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
     # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
-    # Who sits as measured meets neither: there a large belly, and thighs that are broad for the hips, press them flatter.
+    # Who sits as measured meets neither: there a large belly, and thighs broad for the hips, press them flatter.
     beside = sign * hip + inwards(out)
     free = min(_under_belly(size, (front, beside, 0.3 * thigh)), abs(beside)) - person.clothing
     core = max(min((1.0 - 0.4) * high, free - 1e-3), 0.1 * high)
@@ -120,8 +120,9 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
 
 
 def _under_belly(size: Dimensions, near: tuple[float, float, float]) -> float:
-    """Distance from the belly of who sits erect to the axis of a thigh's core, which begins `near` (above, beside, ahead)
-    of the middle of the hips.
+    """Distance from the belly of who sits erect to the axis of a thigh's core.
+
+    It leads ahead, and begins at `near` (3,): metres above, beside and ahead of the middle of the hips.
     """
     belly = next(part for part in trunk_slices(size) if part.segment == "upper_lumbar")
     joints = [size.body.origin(f"spine{level}_flexion") for level in (1, 2)]
