@@ -40,6 +40,6 @@ def _kept(person: Person, hand: str) -> Surface:
         return hand_surface(person, hand) if hand else person_surface(person)
 
     # The number is another one whenever a shape, a weight or the layout changes.
-    digest = hashlib.sha256(f"31 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
+    digest = hashlib.sha256(f"32 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
     bones, patches = cached_entry(digest.hexdigest(), make)
     return Surface(tuple(Bone(*each) for each in bones), tuple(Patch(*each) for each in patches))

@@ -38,9 +38,9 @@ def head_shape(size: Dimensions) -> HeadShape:
         return lambda points: field((points - origin) / scale) * least
 
     female = size.body.sex == "female"
-    # upper and lower lids are too thin for the head's own mesh: without them eyes stare
-    lids = without(_part("lids"), _part("slits"), 0.002)
-    parts = _face(female), _hair(female), _part("eyes"), lids, _part("irises"), _part("brows"), _part("lips")
+    face = _face(female)
+    lids = without(_around_eyes(face), _part("slits"), 0.002)
+    parts = face, _hair(female), _part("eyes"), lids, _part("irises"), _part("brows"), union(_solids("lips"), 0.004)
     return HeadShape(*map(stretched, parts))
 
 
@@ -50,6 +50,19 @@ def _face(female: bool) -> Field:
     face = without(union(solids, 0.022), _part("sockets"), 0.014)
     ears = union([ellipsoid((-0.006, s * 0.077, 0.104), (0.017, 0.007, 0.030), _ear_axes(s)) for s in (1.0, -1.0)])
     return union([union([face, union(_solids("nose"), 0.008)], 0.014), ears], 0.006)
+
+
+def _around_eyes(face: Field) -> Field:
+    """Lids and the skin around them, for which the head's own mesh is too coarse. Its edge is below that mesh."""
+    places = [np.array(given["ellipsoid"][0]) * (1.0, side, 1.0) for given in _given("eyes") for side in (1.0, -1.0)]
+    smooth = union([face, _part("lids")], 0.008)
+
+    def field(points: Array) -> Array:
+        away = np.min([np.linalg.norm(points - place, axis=-1) for place in places], axis=0)
+        # a little over the mesh where the lids are, and below it 30 mm from the middle of the eye
+        return np.asarray(np.maximum(smooth(points) - 0.0005 + 0.0011 * (away / 0.027) ** 4, away - 0.032))
+
+    return field
 
 
 def _skull() -> Field:
@@ -84,7 +97,7 @@ def _part(name: str) -> Field:
 def _solids(name: str) -> list[Field]:
     """The solids of a part of `head.toml`, each with its mirror image if it has one."""
     made = []
-    for given in packaged_toml(Path(__file__).with_name("head.toml"))[name]:
+    for given in _given(name):
         kind, places = next((kind, number) for kind, number in PLACES.items() if kind in given)
         solid: Any = getattr(fields, kind.replace("cone", "round_cone"))
         sides = []
@@ -93,6 +106,11 @@ def _solids(name: str) -> list[Field]:
             sides.append(solid(*ends, *given[kind][places:]))
         made.append(union(sides))
     return made
+
+
+def _given(name: str) -> list[dict[str, Any]]:
+    """The lines of a part of `head.toml`."""
+    return list(packaged_toml(Path(__file__).with_name("head.toml"))[name])
 
 
 PLACES = {"ball": 1, "ellipsoid": 1, "cone": 2}

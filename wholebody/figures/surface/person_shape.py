@@ -314,11 +314,11 @@ class PersonShape:
         eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
         around = bounds([eye], 0.075 * scale)
         yield Garment("eyes", COLORS.eyes, placed(shape.eyes, frame), *around, 0.0040, rigid)
-        yield Garment("lids", COLORS.skin, placed(shape.lids, frame), *around, 0.0024, rigid)
+        yield Garment("lids", COLORS.skin, placed(shape.lids, frame), *around, 0.0027, rigid)
         yield Garment("irises", COLORS.irises, placed(shape.irises, frame), *around, 0.0025, rigid)
         yield Garment("brows", COLORS.hair, placed(shape.brows, frame), *around, 0.0022, rigid)
         mouth = bounds([eye - np.array([0.0, 0.0, 0.075]) * scale], 0.05 * scale)
-        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.0027, rigid)
+        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.0022, rigid)
 
     def _hand(self, side: str) -> Garment:
         shape, frame = hand_shape(self.person, side), self.bind[f"{side}_hand"]
