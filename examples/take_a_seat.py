@@ -8,12 +8,19 @@ from presenting import OAK, command_line, picture, report
 
 import wholebody as wb
 
-HIGH = 0.38  # m: for popliteal heights from 0.365 m on; shorter legs need a lower chair or a footrest
+HIGH = 0.38  # m: of the seat
 
 
 def build(figure: wb.Figure | None = None, high: float = HIGH) -> wb.Problem:
-    """State the problem, of a woman if nobody is given; tasks/take_a_seat.toml states the same."""
-    scene = wb.Scene(figure or wb.load("human", sex="female", stature=1.65))
+    """State the problem, of a woman if nobody is given; tasks/take_a_seat.toml states the same.
+
+    With the back at the backrest and flat soles, a seat is no higher than the hollow of the knee: short legs get a
+    lower chair.
+    """
+    figure = figure or wb.load("human", sex="female", stature=1.65)
+    if (person := figure.describe().person) is not None:
+        high = min(high, dict(person.dimensions)["popliteal_height"] + person.shoes)
+    scene = wb.Scene(figure)
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, high - 0.02), color=OAK)
     scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.56, 0.0, high + 0.42), color=OAK)

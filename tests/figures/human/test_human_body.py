@@ -262,6 +262,36 @@ def test_named_postures_of_who_is_dressed_are_free(who, detail):
     assert "overlap" in load("human", clothing=0.05, **who).notes[0]
 
 
+@pytest.mark.parametrize("build", [
+    {"stature": 1.75, "mass": 84.0}, {"stature": 1.72, "mass": 122.0}, {"stature": 1.75, "mass": 140.0},
+    {"stature": 1.72, "mass": 122.0, "clothing": 0.005}, {"sex": "female", "stature": 1.60, "mass": 105.0},
+    {"sex": "female", "stature": 1.70, "mass": 62.0, "proportions": {"thigh_clearance": 0.185}},
+], ids=range(6))  # fmt: skip
+def test_who_sits_as_measured_does_not_meet_the_own_belly(build):
+    # Everybody of ANSUR II was measured sitting erect with level, parallel thighs, whatever the belly.
+    figure = load("human", **build)
+    flexed = {f"{side}_hip_flexion": 90.0 for side in ("left", "right")}
+
+    def met(more):
+        """Pairs of trunk and thighs that penetrate, as coal says, with the hips bent further by so many degrees."""
+        angles = {name: math.radians(angle + more) for name, angle in flexed.items()}
+        data = pin.GeometryData(figure.geometry)
+        q = figure.with_joints(pin.neutral(figure.model), angles)
+        pin.updateGeometryPlacements(figure.model, figure.model.createData(), figure.geometry, data, q)
+        parts = [piece.name.partition(":")[0] for piece in figure.geometry.geometryObjects]
+        soft = ("lumbar", "thorax", "pelvis", "thigh")
+        return {
+            (parts[pair.first], parts[pair.second])
+            for k, pair in enumerate(figure.geometry.collisionPairs)
+            if parts[pair.first].endswith(soft) and parts[pair.second].endswith(soft)
+            and pin.computeDistance(figure.geometry, data, k).min_distance < 0.0
+        }  # fmt: skip
+
+    assert met(0.0) == set()
+    if build["mass"] > 100.0:
+        assert ("upper_lumbar", "left_thigh") in met(15.0)
+
+
 def test_what_differs_from_the_usual_is_printed():
     figure = load("human", sex="female", age=60, shoes=0.03, clothing=0.01)
     assert "age=60, shoes=0.03, clothing=0.01" in repr(figure)

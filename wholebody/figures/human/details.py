@@ -96,7 +96,10 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     yield with_values(_between(f"{name}:{SPREAD}", name, flesh, start, end), flesh=True)
     # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
     # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
-    core = (1.0 - 0.4) * high
+    # Who sits as measured meets neither: there a large belly, and thighs broad for the hips, press them flatter.
+    beside = sign * hip + inwards(out)
+    free = min(_under_belly(size, (front, beside, 0.3 * thigh)), abs(beside)) - person.clothing
+    core = max(min((1.0 - 0.4) * high, free - 1e-3), 0.1 * high)
     yield _between(f"{name}:2", name, core, (front, inwards(out), -0.3 * thigh), (front, inwards(out), -0.42 * thigh))
     knee = person.size("knee")
     # Before the seat's front edge the underside is level with the seat, and rises to that of the knee.
@@ -112,6 +115,24 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     yield _between(f"{name}:0", name, calf, (upper, 0.0, -top), (lower, 0.0, -0.42 * shank))
     # Between knee and calf the shank is as thick as its bone.
     yield _between(f"{name}:1", name, ankle, (shin - ankle, 0.0, -0.1 * shank), (0.0, 0.0, -0.94 * shank))
+
+
+def _under_belly(size: Dimensions, near: tuple[float, float, float]) -> float:
+    """Distance from the belly of who sits erect to the axis of a thigh's core.
+
+    It leads ahead, and begins at `near` (3,): metres above, beside and ahead of the middle of the hips.
+    """
+    belly = next(part for part in trunk_slices(size) if part.segment == "upper_lumbar")
+    joints = [size.body.origin(f"spine{level}_flexion") for level in (1, 2)]
+    radius, long = sorted((belly.half_depth, belly.half_breadth))
+    deep, wide = (0.0, long - radius) if belly.half_breadth > belly.half_depth else (long - radius, 0.0)
+    above, beside, ahead = near
+    apart = (
+        max(ahead - belly.x - sum(x for x, _, _ in joints) - deep, 0.0),
+        max(abs(beside) - wide, 0.0),
+        belly.z + sum(z for _, _, z in joints) - above,
+    )
+    return math.hypot(*apart) - radius - size.body.clothing
 
 
 def clavicle(size: Dimensions, side: str) -> Solid:
