@@ -266,33 +266,39 @@ class Multistart(Search):
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
         if not self.settings.restarts:
             return
-        begun = 2 * len(self.trace) + SEARCH.cheap
-        least, tried = (self._through_measure, 0) if self._through_measure else self._below_things()
-        more = int(not (tried or count or self._touches))  # a descent to a contact takes ten times as long
-        rng = np.random.default_rng([self.settings.seed, count + 1])
+        begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
         starts = restarts(*given, rng, self.settings.restarts)
+        # a descent to a contact takes ten times as long
+        others = islice(starts, 0 if count or self._touches else SEARCH.alone)
+        least = self._through_measure or self._below_things(others)
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
-            most = more + (0 if self._touches else int(SEARCH.dear * dear))
+            most = 0 if self._touches else int(SEARCH.dear * dear)
             if number >= most or len(self.trace) > begun or self.control.over:
                 break
             self._lower(q)
 
-    def _below_things(self) -> tuple[float, int]:
-        """Seek lower minima beside those through things; the least measures there, 0 if unknown, and starts tried."""
-        tolerance, least, tried = self.settings.tolerance, np.inf, 0
+    def _below_things(self, others: Iterator[Array]) -> float:
+        """Seek lower minima beside those through things, also from other starts where these are no lower than the best.
+
+        Returns:
+            The least measures through things; 0 where none are known.
+        """
+        tolerance, least, tried = self.settings.tolerance, np.inf, False
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        for q in (self._start, self.best.q):
-            if least < self.best.measure:
-                break  # otherwise another minimum through things than beside them
-            through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), q)
+        less = SEARCH.less_of_contacts if self._touches else SEARCH.less
+        for number, q in enumerate(chain((self._start, self.best.q), others)):
+            if tried if number > 1 else least < self.best.measure:
+                continue  # otherwise another minimum through things than beside them
+            descent = SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things")
+            descent.below = less * self.best.measure
+            through = self._ran(descent, q)
             if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
                 least = through.measure
-                less = SEARCH.less_of_contacts if self._touches else SEARCH.less
                 if least < less * self.best.measure and not self.control.over:
-                    tried += 1
+                    tried = True
                     self._lower(through.q)
-        return (least if np.isfinite(least) else 0.0), tried
+        return least if np.isfinite(least) else 0.0
 
     def _lower(self, start: Array) -> None:
         """Seek feasibility from a start, and descend from there as long as the measures may come below the least."""
