@@ -252,7 +252,7 @@ class Multistart(Search):
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _seek_lower(self, count: int) -> None:
-        """Where all is met, seek lower minima: `count` from feasible postures; one more, and others among things."""
+        """Where all is met, seek lower minima: `count` from feasible postures, and from those through things."""
         tolerance, measures = self.settings.tolerance, self.settings.measures and self.problem.measures
         if not measures or self.best.violation.worst > tolerance:
             return
@@ -268,9 +268,10 @@ class Multistart(Search):
             return
         begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
         starts = restarts(*given, rng, self.settings.restarts)
-        # a descent to a contact takes ten times as long
-        others = islice(starts, 0 if count or self._touches else SEARCH.alone)
-        least = self._through_measure or self._below_things(others)
+        if self._through_measure:
+            least = self._through_measure
+        else:  # a descent to a contact takes ten times as long; the first start is near to the problem's
+            least = self._below_things(islice(starts, 1, 1 if count or self._touches else 1 + SEARCH.alone))
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
             most = 0 if self._touches else int(SEARCH.dear * dear)
@@ -279,26 +280,32 @@ class Multistart(Search):
             self._lower(q)
 
     def _below_things(self, others: Iterator[Array]) -> float:
-        """Seek lower minima beside those through things, also from other starts where these are no lower than the best.
+        """Seek a lower minimum beside one through things: from the start where things are in the way, else from others.
 
         Returns:
             The least measures through things; 0 where none are known.
         """
-        tolerance, least, tried = self.settings.tolerance, np.inf, False
-        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         less = SEARCH.less_of_contacts if self._touches else SEARCH.less
-        for number, q in enumerate(chain((self._start, self.best.q), others)):
-            if tried if number > 1 else least < self.best.measure:
-                continue  # otherwise another minimum through things than beside them
-            descent = SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things")
-            descent.below = less * self.best.measure
-            through = self._ran(descent, q)
-            if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
-                least = through.measure
-                if least < less * self.best.measure and not self.control.over:
-                    tried = True
-                    self._lower(through.q)
-        return least if np.isfinite(least) else 0.0
+        best = self.best.measure
+        through = self._through(self.best.q, less)
+        blocked = through.measure < less * best
+        for q in [self._start] if blocked else others:
+            local = self._through(q, less)
+            through = local if local.measure < through.measure else through
+            if not blocked and through.measure < less * best:
+                break
+        if through.measure < less * best and not self.control.over:
+            self._lower(through.q)
+        return through.measure if np.isfinite(through.measure) else 0.0
+
+    def _through(self, start: Array, less: float) -> LocalSolution:
+        """A descent through things, as long as it may come below a share of the least measures; else these are inf."""
+        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
+        descent = SQP(alone, self.settings.tolerance, self._at_most(SEARCH.probe_programs), "through things")
+        descent.below = less * self.best.measure
+        local = self._ran(descent, start)
+        met = local.violation.worst <= self.settings.tolerance
+        return local if met else with_values(local, measure=np.inf)
 
     def _lower(self, start: Array) -> None:
         """Seek feasibility from a start, and descend from there as long as the measures may come below the least."""
