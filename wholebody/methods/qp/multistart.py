@@ -268,10 +268,8 @@ class Multistart(Search):
             return
         begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
         starts = restarts(*given, rng, self.settings.restarts)
-        if self._through_measure:
-            least = self._through_measure
-        else:  # a descent to a contact takes ten times as long; the first start is near to the problem's
-            least = self._below_things(islice(starts, 1, 1 if count or self._touches else 1 + SEARCH.alone))
+        # a descent to a contact takes ten times as long; the second start is half way to the limits
+        least = self._through_measure or self._below_things(() if count or self._touches else islice(starts, 1, 2))
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
             most = 0 if self._touches else int(SEARCH.dear * dear)
@@ -279,29 +277,32 @@ class Multistart(Search):
                 break
             self._lower(q)
 
-    def _below_things(self, others: Iterator[Array]) -> float:
+    def _below_things(self, others: Iterable[Array]) -> float:
         """Seek a lower minimum beside one through things: from the start where things are in the way, else from others.
 
         Returns:
             The least measures through things; 0 where none are known.
         """
         less = SEARCH.less_of_contacts if self._touches else SEARCH.less
-        best = self.best.measure
-        through = self._through(self.best.q, less)
+        through, best = self._through(self.best.q, less), self.best.measure
         blocked = through.measure < less * best
         for q in [self._start] if blocked else others:
-            local = self._through(q, less)
+            local = self._through(q, less, feasible=not blocked)
             through = local if local.measure < through.measure else through
-            if not blocked and through.measure < less * best:
-                break
         if through.measure < less * best and not self.control.over:
             self._lower(through.q)
         return through.measure if np.isfinite(through.measure) else 0.0
 
-    def _through(self, start: Array, less: float) -> LocalSolution:
-        """A descent through things, as long as it may come below a share of the least measures; else these are inf."""
-        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        descent = SQP(alone, self.settings.tolerance, self._at_most(SEARCH.probe_programs), "through things")
+    def _through(self, start: Array, less: float, feasible: bool = False) -> LocalSolution:
+        """A descent through things, as long as it may come below a share of the least measures; else these are inf.
+
+        From a `feasible` posture first: far from the goals measures lead to the minimum that is known.
+        """
+        alone, most = self.lineariser.relaxed(ENDLESS), self._at_most(SEARCH.probe_programs)
+        if feasible:
+            start = self._ran(self._feasibility(alone, most, "through things"), start).q
+        shared = with_values(self._shared, lineariser=alone)
+        descent = SQP(shared, self.settings.tolerance, most, "through things")
         descent.below = less * self.best.measure
         local = self._ran(descent, start)
         met = local.violation.worst <= self.settings.tolerance

@@ -182,7 +182,6 @@ class SearchNumbers(NamedTuple):
     screened: int = 4  # feasible postures that are looked for, for each descended from. More: lower measures, slower.
     # starts that seek lower minima, for each factor e that things multiply the measures by. More: lower, slower.
     dear: float = 3.0
-    alone: int = 2  # starts through things for lower measures, where these are not in the way. More: lower, slower.
     cheap: int = 60  # programs that starts for lower measures may take beside as many as before. More: lower, slower.
     width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
     less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
