@@ -258,7 +258,7 @@ class Multistart(Search):
             return
         given, found = (self.problem, self.lineariser.state, self._start), list[LocalSolution]()
         others = restarts(*given, np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count - 1)
-        for q in chain([self._start], others) if count else ():
+        for q in chain([self._start], self.lineariser.defined(others)) if count else ():
             local = None if self.control.over else self._through_things(q, "for measure")
             if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
@@ -267,7 +267,7 @@ class Multistart(Search):
         if not self.settings.restarts:
             return
         begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
-        starts = restarts(*given, rng, self.settings.restarts)
+        starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
         # a descent to a contact takes ten times as long; the second start is half way to the limits
         least = self._through_measure or self._below_things(() if count or self._touches else islice(starts, 1, 2))
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
