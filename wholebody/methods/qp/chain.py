@@ -162,7 +162,8 @@ class Descents:
                 return Met(q, tuple(self.trace), self.measured or not self.settings.measures)
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
-                return met if self.chain.arm is None else with_values(met, blocked=None)
+                # An end of an exact arm that did not come to rest at its limits takes at most a per cent more.
+                return met if self.chain.arm is None else with_values(met, blocked=None, stationary=self.measured)
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if first is None:

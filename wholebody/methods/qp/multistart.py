@@ -244,13 +244,13 @@ class QPMultistart(Search):
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _seek_lower(self, count: int) -> None:
-        """Where all is met, seek lower minima: `count` from feasible postures; one more, and others among things."""
+        """Where all is met, seek lower minima: `count` from feasible postures, and from those through things."""
         tolerance, measures = self.settings.tolerance, self.settings.measures and self.problem.measures
         if not measures or self.best.violation.worst > tolerance:
             return
         given, found = (self.problem, self.lineariser.state, self._start), list[LocalSolution]()
         others = restarts(*given, np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count - 1)
-        for q in chain([self._start], others) if count else ():
+        for q in chain([self._start], self.lineariser.defined(others)) if count else ():
             local = None if self.control.over else self._through_things(q, "for measure")
             if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
@@ -258,33 +258,47 @@ class QPMultistart(Search):
             self.accept(self._descend(local.q, note="for measure"), "from a start for the measures")
         if not self.settings.restarts:
             return
-        begun = 2 * len(self.trace) + SEARCH.cheap
-        least, tried = (self._through_measure, 0) if self._through_measure else self._below_things()
-        more = int(not (tried or count or self._touches))  # a descent to a contact takes ten times as long
-        rng = np.random.default_rng([self.settings.seed, count + 1])
-        starts = restarts(*given, rng, self.settings.restarts)
+        begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
+        starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
+        # a descent to a contact takes ten times as long; the second start is half way to the limits
+        least = self._through_measure or self._below_things(() if count or self._touches else islice(starts, 1, 2))
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
-            most = more + (0 if self._touches else int(SEARCH.dear * dear))
+            most = 0 if self._touches else int(SEARCH.dear * dear)
             if number >= most or len(self.trace) > begun or self.control.over:
                 break
             self._lower(q)
 
-    def _below_things(self) -> tuple[float, int]:
-        """Seek lower minima beside those through things; the least measures there, 0 if unknown, and starts tried."""
-        tolerance, least, tried = self.settings.tolerance, np.inf, 0
-        alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
-        for q in (self._start, self.best.q):
-            if least < self.best.measure:
-                break  # otherwise another minimum through things than beside them
-            through = self._ran(SQP(alone, tolerance, self._at_most(SEARCH.probe_programs), "through things"), q)
-            if through.violation.worst <= tolerance and through.measure < SEARCH.less * least:
-                least = through.measure
-                less = SEARCH.less_of_contacts if self._touches else SEARCH.less
-                if least < less * self.best.measure and not self.control.over:
-                    tried += 1
-                    self._lower(through.q)
-        return (least if np.isfinite(least) else 0.0), tried
+    def _below_things(self, others: Iterable[Array]) -> float:
+        """Seek a lower minimum beside one through things: from the start where things are in the way, else from others.
+
+        Returns:
+            The least measures through things; 0 where none are known.
+        """
+        less = SEARCH.less_of_contacts if self._touches else SEARCH.less
+        through, best = self._through(self.best.q, less), self.best.measure
+        blocked = through.measure < less * best
+        for q in [self._start] if blocked else others:
+            local = self._through(q, less, feasible=not blocked)
+            through = local if local.measure < through.measure else through
+        if through.measure < less * best and not self.control.over:
+            self._lower(through.q)
+        return through.measure if np.isfinite(through.measure) else 0.0
+
+    def _through(self, start: Array, less: float, feasible: bool = False) -> LocalSolution:
+        """A descent through things, as long as it may come below a share of the least measures; else these are inf.
+
+        From a `feasible` posture first: far from the goals measures lead to the minimum that is known.
+        """
+        alone, most = self.lineariser.relaxed(ENDLESS), self._at_most(SEARCH.probe_programs)
+        if feasible:
+            start = self._ran(self._feasibility(alone, most, "through things"), start).q
+        shared = with_values(self._shared, lineariser=alone)
+        descent = SQP(shared, self.settings.tolerance, most, "through things")
+        descent.below = less * self.best.measure
+        local = self._ran(descent, start)
+        met = local.violation.worst <= self.settings.tolerance
+        return local if met else with_values(local, measure=np.inf)
 
     def _lower(self, start: Array) -> None:
         """Seek feasibility from a start, and descend from there as long as the measures may come below the least."""
