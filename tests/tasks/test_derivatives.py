@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 
 from wholebody import tasks
 from wholebody.figures import load
+from wholebody.figures.description import JointCone
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 
@@ -82,10 +82,10 @@ class RoundCone:
 def scene(humanoid: Any) -> Any:
     cone = RoundCone((0.2, 0.9, -0.3), 1.0)
     humanoid.figure.cones = {
-        "left": SimpleNamespace(
+        "left": JointCone(
             cone=cone, reference="chest2_body", limb="larm_upperarm_body", axis=np.array([0, 0, -1.0])
         ),
-        "right": SimpleNamespace(
+        "right": JointCone(
             cone=cone, reference="chest2_body", limb="rarm_upperarm_body", axis=np.array([0, 1.0, 1])
         ),
     }

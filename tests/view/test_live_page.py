@@ -106,7 +106,7 @@ def test_mouse_drags_holds_undoes_and_saves(
     page: LivePage, browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     drag, start = page.drag, page.drag.q.copy()
-    monkeypatch.setattr(browser, "timeout", 240.0)
+    monkeypatch.setattr("wholebody.view.browser.TIMEOUT", 240.0)
     browser.resize(SIZE)
     page.server.initial_camera.position, page.server.initial_camera.look_at = EYE, TARGET
     browser.open(page.url, "document.readyState === 'complete'")

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.model_check import joint_of
@@ -169,11 +169,13 @@ def resampled(model: pin.Model, path: Sequence[Array], count: int) -> Array:
 def refined(model: pin.Model, path: Sequence[Array], count: int) -> Array:
     """About so many postures (n, nq) on a path, at nearly equal lengths, its own ones among them: no corner is cut."""
     at = _lengths(model, path)
+    if at[-1] < 1e-9:  # it stays: no length tells its postures apart
+        return resampled(model, path, count)
     even = np.linspace(0.0, at[-1], count)
-    nearest = np.rint(at[1:-1] / max(even[1], 1e-15)).astype(int)
+    nearest = np.rint(at[1:-1] / even[1]).astype(int)
     kept = np.delete(even, np.unique(nearest[(nearest > 0) & (nearest < count - 1)]))
     places = np.sort(np.concatenate([kept, at[1:-1]]))
-    apart = np.diff(places, prepend=-1.0) > 1e-9
+    apart = np.diff(places, prepend=-1.0) > 1e-6 * even[1]
     return _at(model, path, at, places[apart])
 
 
@@ -234,7 +236,7 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
         share -= 0.6 * share * np.where(anew, near / near.max(), 0.0)
     # width of the filter of the remaining corners, points; larger = rounder, less exact
     free = places(model, found)
-    wide, beside = _filtered(free, 2.0), np.convolve(blocked, np.ones(10), "same") > 0.0
+    wide, beside = _filtered(free, 2.0), maximum_filter1d(blocked, 10)
     stays = np.concatenate([[False], beside]) | np.concatenate([beside, [False]])
     # what is not proven free there is as the path was before, and stays so
     rounded, cut = local.settled(_postures(model, path, np.where(stays[:, None], free, wide)))

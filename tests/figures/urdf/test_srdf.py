@@ -104,7 +104,7 @@ def test_a_wrong_srdf_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"state 'home': joint 'j1': .*'0,5'"):
         wb.load(urdf, srdf=srdf)
     srdf.write_text("<mujoco/>")
-    with pytest.raises(FileFormatError, match="give an SRDF"):
+    with pytest.raises(FileFormatError, match="give a robot's SRDF"):
         wb.load(urdf, srdf=srdf)
     srdf.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="arm.xacro"/></robot>')
     with pytest.raises(FileFormatError, match=r"`xacro r\.srdf > robot\.srdf`"):
