@@ -82,12 +82,8 @@ class RoundCone:
 def scene(humanoid: Any) -> Any:
     cone = RoundCone((0.2, 0.9, -0.3), 1.0)
     humanoid.figure.cones = {
-        "left": JointCone(
-            cone=cone, reference="chest2_body", limb="larm_upperarm_body", axis=np.array([0, 0, -1.0])
-        ),
-        "right": JointCone(
-            cone=cone, reference="chest2_body", limb="rarm_upperarm_body", axis=np.array([0, 1.0, 1])
-        ),
+        "left": JointCone(cone=cone, reference="chest2_body", limb="larm_upperarm_body", axis=np.array([0, 0, -1.0])),
+        "right": JointCone(cone=cone, reference="chest2_body", limb="rarm_upperarm_body", axis=np.array([0, 1.0, 1])),
     }
     return humanoid
 
