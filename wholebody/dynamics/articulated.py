@@ -25,12 +25,11 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, near_limits, share_below
 from wholebody.dynamics.frame import EngineFrame, impacts
-from wholebody.dynamics.pieces import places, surface_of
+from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN, Impulses
 from wholebody.figures.state import free_roots
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
-from wholebody.scene.matter.body import Surface
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
@@ -66,11 +65,10 @@ class Articulated:
         self._names = list(dict.fromkeys((*(() if engine is None else engine.names), *owners)))  # the engine's first
         number = {name: k for k, name in enumerate(self._names)}
         self._owners: Indices = np.array([number[name] for name in owners], dtype=np.intp)
-        self._pairs = len(self._workspace.table.pairs) + (0 if engine is None else engine.pairs)
         self._old = Impulses.nothing(0)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked, self._surfaces = self.q, dict[tuple[int, int], Surface]()
+        self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
         self._asked, self._masses = b"", np.zeros((0, 0))
         light = pin.crba(self._model, self._data, self.q).diagonal() < 1e-5  # kg m2: of links without mass
         self._model.armature += np.where(light, 1e-5, 0.0)
@@ -237,26 +235,15 @@ class Articulated:
         directions = np.concatenate([made.axes[:count], cross(place[:, None], made.axes[:count])], axis=2)
         joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
         made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
-        made.restitution[:count], made.friction[:count] = self._surfaces_of(owner)
+        made.restitution[:count], made.friction[:count] = self._surfaces(owner)
         slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
         slot[bodies] = np.arange(len(bodies))
         centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
         made.add_things(owner, slot, centres, twists, directions)
         made.figure[3 * np.arange(count, self.points), freedom], made.gap[count:] = sign, room
-        # each side of each freedom counts as a pair, after those of pieces
-        made.pair[:count] = pair
-        made.pair[count:] = self._pairs + 2 * freedom + (sign < 0.0)
+        # each side of each freedom counts as a pair, before those of pieces
+        made.pair[:count], made.pair[count:] = 2 * model.nv + pair, 2 * freedom + (sign < 0.0)
         return made
-
-    def _surfaces_of(self, owner: Indices) -> tuple[Array, Array]:
-        """Restitution and friction (k,) where bodies (k, 2) touch."""
-        both, which = np.unique(owner, axis=0, return_inverse=True)
-        for first, second in both.tolist():
-            if (first, second) not in self._surfaces:
-                self._surfaces[first, second] = surface_of(self._scene, self._names[first], self._names[second])
-        known = np.array([self._surfaces[first, second] for first, second in both.tolist()]).reshape(-1, 2)
-        found = known[which.ravel()]
-        return found[:, 0], found[:, 1]
 
     def _approach(self, moved: Array) -> Array:
         """How fast the pieces of every pair can approach each other (pairs,), m/s; `moved` (n, 6): see `_points`."""
@@ -322,8 +309,8 @@ class Articulated:
         figure, things, begun = points.figure[rows], points.things[rows], speed[rows]
         mobility = impulse_kernel.mobilities(inertia, figure)
         impulse_kernel.add_bodies(mobility, things, points.responses)
-        begin = impulse if start is None else start
-        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin[kept])
+        begin = None if start is None else start[kept]
+        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin)
         flat = found.ravel()
         gain = float(flat @ (begun + after))
         if start is None and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less

@@ -279,8 +279,8 @@ class Points(NamedTuple):
             twists: (n, 6) at the origin, of what is moved; zero for others.
             directions: (k, 3, 6) take a twist at the origin to velocities along the axes of each point.
         """
-        things, given = self.things.reshape(len(self.gap), 3, -1, 6), self.given.reshape(-1, 3)
-        moved = twists.any(axis=1)
+        things, given = self.things.reshape(len(self.gap), 3, len(self.bodies), 6), self.given.reshape(-1, 3)
+        moving: Mask = (slot >= 0) | twists.any(axis=1)
         for side, sign in enumerate((-1.0, 1.0)):
             whose = owner[:, side]
             c = np.flatnonzero(slot[whose] >= 0)
@@ -288,11 +288,11 @@ class Points(NamedTuple):
             things[c, :, b, :3] = sign * axes
             things[c, :, b, 3:] = sign * (directions[c, :, 3:] - cross(centres[b][:, None], axes))
             given[: len(owner)] += sign * np.einsum("crk,ck->cr", directions, twists[whose])
-            self.driven[: len(owner)] |= (slot[whose] >= 0) | moved[whose]
+            self.driven[: len(owner)] |= moving[whose]
 
     def held(self, impulse: Array) -> set[str]:
         """Names of the bodies that impulses (m, 3) act on."""
-        acted = self.things.reshape(len(self.gap), 3, -1, 6)[impulse.any(axis=1)].any(axis=(0, 1, 3))
+        acted = self.things.reshape(len(self.gap), 3, len(self.bodies), 6)[impulse.any(axis=1)].any(axis=(0, 1, 3))
         return {self.bodies[b] for b in np.flatnonzero(acted).tolist()}
 
 
@@ -308,9 +308,9 @@ def near_limits(
 ) -> tuple[Indices, Array, Array]:
     """Of `limited` (k, 2): places in q, velocity: that can come to a limit, the sign away from it, and how far."""
     at, freedom = limited.T
-    gaps = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
+    gaps: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
     side, which = np.nonzero(gaps < 0.02 + 1.5 * time * np.abs(velocity[freedom]))  # rad, m
-    return freedom[which], 1.0 - 2.0 * side, gaps[side, which]
+    return freedom[which], np.array([1.0, -1.0])[side], gaps[side, which]
 
 
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:

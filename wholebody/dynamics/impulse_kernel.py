@@ -80,7 +80,7 @@ def _push(row: int, one: float, two: float, three: float, mobility: Array, veloc
 def solve(
     mobility: Array, velocity: Array, laws: tuple[Array, Array], impulse: Array, most: int, tolerance: float
 ) -> None:
-    """Change impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both axes of friction together.
+    """Change impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both frictions together.
 
     At every point 0 <= p_n is complementary to u_n - target >= 0, and p_t is at most friction p_n against the sliding.
     Sweeps go over points that approach or did so before, a few of those that are near.
@@ -256,10 +256,16 @@ def by_inertia(inertia: Array, momentum: Array) -> Array:
     return np.asarray(velocity if known else np.linalg.solve(inertia, momentum))
 
 
-def impulses(mobility: Array, speed: Array, friction: Array, target: Array, start: Array) -> tuple[Array, Array]:
-    """Impulses (m, 3) along the axes of m points, found from others, and the velocities (3 m,) with them; see `solve`."""
-    velocity, impulse = speed.copy(), start.copy()
-    solve(mobility, velocity, (friction, target), impulse, 1000, 1e-7)
+def impulses(
+    mobility: Array, speed: Array, friction: Array, target: Array, start: Array | None = None
+) -> tuple[Array, Array]:
+    """Impulses (m, 3) along the axes of m points, and the velocities (3 m,) with them; arguments as of `solve`.
+
+    With those of the step before as a `start`, 1e-6 m/s is exact enough, and the next step goes on from there.
+    """
+    velocity, impulse = speed.copy(), np.zeros((len(friction), 3)) if start is None else start.copy()
+    most, tolerance = (1000, 1e-7) if start is None else (500, 1e-6)
+    solve(mobility, velocity, (friction, target), impulse, most, tolerance)
     if violation(mobility, velocity, friction, target, impulse) > COARSE:
         impulse = _refined(mobility, speed, friction, target, impulse)
         velocity = speed + mobility @ impulse.ravel()

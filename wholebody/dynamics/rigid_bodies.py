@@ -142,8 +142,7 @@ class RigidBodies:
 
     def push(self, name: str, impulse: Array, point: Array) -> None:
         """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes."""
-        lever = _bounded(point, FARTHEST, "point") - self.state.bodies.position[self._number(name)]
-        impulse = _bounded(impulse, 1e6, "impulse")
+        lever, impulse = _bounded(point, FARTHEST, "point") - self.centre(name), _bounded(impulse, 1e6, "impulse")
         self.push_about_centre(name, np.concatenate([impulse, pin.skew(lever) @ impulse]))
 
     def push_about_centre(self, name: str, wrench: Array) -> None:
@@ -151,16 +150,14 @@ class RigidBodies:
         number, twist = self._number(name), self.state.bodies.twist
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        jointed = self.state.bodies.jointed[number]
-        before = self.energy() if jointed else 0.5 * float(wrench @ twist[number])
+        before = twist[number].copy()
         self.state.velocity[number] += wrench[:3] / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ wrench[3:]
         self.state.bodies.moving[self._joints.linked(number)] = True
-        if jointed:
+        if self.state.bodies.jointed[number]:
             self._joints.project_velocities(self.state, twist, self.state.bodies.moving)
-            self._pushed += self.energy() - before
-        else:  # along the mean of the velocities before and after
-            self._pushed += before + 0.5 * float(wrench @ twist[number])
+        # along the mean of both velocities, where joints, which hold in both, do no work
+        self._pushed += 0.5 * float(wrench @ (before + twist[number]))
 
     def put(self, name: str, at: PlacementLike) -> None:
         """Put a body elsewhere, with its velocity; it wakes, and what lay on it. What that raises is work."""
@@ -230,11 +227,6 @@ class RigidBodies:
         self._sleepers.update(self._near, dt)
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
-
-    @property
-    def pairs(self) -> int:
-        """Number of the pairs of pieces that can meet."""
-        return len(self._pieces.table.pairs)
 
     def contacts(self, names: Collection[str]) -> ContactPoints:
         """Points at which bodies with these names, and those that touch them in turn, can touch other things."""
