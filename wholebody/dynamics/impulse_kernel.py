@@ -101,6 +101,9 @@ def solve(
         if impulse[c, 0] > 0.0 and mobility[3 * c, 3 * c] > 1e-12:
             chosen[number], waits[c] = c, False
             number += 1
+            size, bound = np.sqrt(impulse[c, 1] ** 2 + impulse[c, 2] ** 2), friction[c] * impulse[c, 0]
+            if size > bound:  # as where the normal has turned
+                impulse[c, 1], impulse[c, 2] = impulse[c, 1] * (bound / size), impulse[c, 2] * (bound / size)
             _push(3 * c, impulse[c, 0], impulse[c, 1], impulse[c, 2], mobility, velocity)
         else:
             impulse[c, 0], impulse[c, 1], impulse[c, 2] = 0.0, 0.0, 0.0
