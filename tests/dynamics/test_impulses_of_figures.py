@@ -7,7 +7,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.dynamics.coupling import approaches
-from wholebody.dynamics.impulse_kernel import by_inertia, impulses, mobilities
+from wholebody.dynamics.impulse_kernel import add_bodies, by_inertia, impulses, mobilities, solve
 
 
 def test_few_of_many_points_bear_what_the_laws_of_contact_ask() -> None:
@@ -32,6 +32,36 @@ def test_few_of_many_points_bear_what_the_laws_of_contact_ask() -> None:
     against = (impulse[sliding, 1:] * along[sliding]).sum(axis=1)
     lengths = np.linalg.norm(impulse[sliding, 1:], axis=1) * np.linalg.norm(along[sliding], axis=1)
     assert np.allclose(against, -lengths, atol=1e-5)
+
+
+def test_impulses_that_begin_at_others_end_at_the_same_velocities() -> None:
+    """Without friction the velocities are those of a convex program, and do not depend on the start."""
+    rng = np.random.default_rng(4)
+    rows = rng.normal(size=(3 * 20, 12))  # more points than freedoms: many impulses are right
+    mobility, none = mobilities(np.eye(12), rows), np.zeros(20)
+    speed = rows @ rng.normal(size=12)
+    impulse, after = impulses(mobility, speed, none, none - 3.0)
+    other, also = np.abs(rng.normal(size=(20, 3))), speed.copy()
+    other[::3, 0] = 0.0
+    solve(mobility, also, (none, none - 3.0), other, 1000, 1e-7)
+    assert (impulse[:, 0] > 0.0).any()
+    assert other[:, 0].min() >= 0.0
+    np.testing.assert_allclose(also, after, atol=1e-4)
+    np.testing.assert_allclose(speed + mobility @ other.ravel(), also, atol=1e-9)
+
+
+def test_bodies_that_are_touched_add_their_mobilities() -> None:
+    rng = np.random.default_rng(5)
+    things, found = rng.normal(size=(12, 18)), np.eye(12)
+    things[:6, 6:12] = 0.0  # some touch one of three bodies
+    things[3:, :6] = 0.0
+    root = rng.normal(size=(3, 6, 6))
+    responses = root @ root.transpose(0, 2, 1)
+    whole = np.zeros((18, 18))
+    for b in range(3):
+        whole[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = responses[b]
+    add_bodies(found, things, responses)
+    np.testing.assert_allclose(found, np.eye(12) + things @ whole @ things.T, atol=1e-12)
 
 
 def test_distances_fall_no_faster_than_the_bound_of_their_pair() -> None:

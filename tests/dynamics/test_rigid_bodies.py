@@ -163,13 +163,12 @@ def test_what_is_taken_back_leaves_nothing_behind(hand: wb.Figure) -> None:
         scene.add(wb.Box((0.1, 0.1, 0.1)), name=name, at=at, body=body)
     engine = RigidBodies(scene)
     engine.advance(1 / 240)
-    owners, before = engine.contacts(["sliding"])
+    before = engine.contacts(["sliding"])
     told, back = (engine.energy(), engine.time, *engine.momentum()), engine.way_back()
     once = engine.advance(1 / 30)
     ended = engine.placement("still")
     back()
-    again, after = engine.contacts(["sliding"])
-    assert again == owners
+    after = engine.contacts(["sliding"])
     for one, other in zip(before, after, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
     assert (engine.energy(), engine.time, *engine.momentum()) == told

@@ -22,15 +22,14 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
-from wholebody.dynamics import impulse_kernel
+from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, near_limits, share_below
 from wholebody.dynamics.frame import EngineFrame, impacts
-from wholebody.dynamics.pieces import places, surface_of
+from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
-from wholebody.dynamics.step_program import SKIN
+from wholebody.dynamics.step_program import SKIN, Impulses
 from wholebody.figures.state import free_roots
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
-from wholebody.scene.matter.body import Surface
 from wholebody.scene.scene import Scene
 
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
@@ -62,11 +61,14 @@ class Articulated:
         self._model.gravity.linear = self._gravity
         self._data, self._workspace = self._model.createData(), scene.workspace()
         self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
-        owners = np.array(self._workspace.owners)
-        self._pieces = {name: np.flatnonzero(owners == name) for name in scene.objects}
+        owners = self._workspace.owners
+        self._names = list(dict.fromkeys((*(() if engine is None else engine.names), *owners)))  # the engine's first
+        number = {name: k for k, name in enumerate(self._names)}
+        self._owners: Indices = np.array([number[name] for name in owners], dtype=np.intp)
+        self._old = Impulses.nothing(0)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked, self._surfaces = self.q, dict[tuple[str, str], Surface]()
+        self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
         self._asked, self._masses = b"", np.zeros((0, 0))
         light = pin.crba(self._model, self._data, self.q).diagonal() < 1e-5  # kg m2: of links without mass
         self._model.armature += np.where(light, 1e-5, 0.0)
@@ -116,7 +118,7 @@ class Articulated:
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         # an impact with the figure that its program did not foresee ends the step, made again at most `STOPS` times
-        figure, impulses = (self.q, self.velocity), self.impulses.copy()
+        figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
         most = time
         while True:
@@ -127,7 +129,7 @@ class Articulated:
                 return done
             self._stops -= 1
             most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
-            (self.q, self.velocity), self.impulses = figure, impulses.copy()
+            (self.q, self.velocity, self._old), self.impulses = figure, impulses.copy()
             back()
 
     def _attempt(
@@ -173,7 +175,7 @@ class Articulated:
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None
-        held = {name for name, c, *_ in points.pushes if bearing[c].any()}
+        held = points.held(bearing)
         energy = engine.energy()
         again = time > SHORTEST and self._stops > 0
         frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
@@ -206,51 +208,54 @@ class Articulated:
     def _points(self, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, and the joint limits that it can reach."""
         workspace, engine, model = self._workspace, self._engine, self._model
-        names = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
-        workspace.place({**names, **{name: way[0] for name, way in moved.items()}})
-        speed = self._approach(names, moved, time)
+        free = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
+        workspace.place({**free, **{name: way[0] for name, way in moved.items()}})
+        twists = np.zeros((len(self._names), 6))  # at the origin, of what is moved
+        for name, (before, after) in moved.items():
+            twists[self._names.index(name)] = pin.log6(after * before.inverse()).vector / time
+        speed = self._approach(twists)
         # m: what is hit in this step can be faster after it
         most = 2e-3 + np.minimum(0.2, time * (1.5 * speed + 0.5 * min(float(speed.max(initial=0.0)), 10.0)))
         near = workspace.near(self.q, float(most.max(initial=0.0)), most)
         rows = self._rows.rows(near)
         kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
-        contact, wrench = rows.contact[kept], rows.wrench[kept]
+        contact, wrench, met = rows.contact[kept], rows.wrench[kept], len(kept)
         normal, place = wrench[:, :3], places(wrench, near, contact)
-        met = [(workspace.owners[first], workspace.owners[second]) for first, second in near.pair[contact].tolist()]
-        touched = {name for both in met for name in both if name in names}
-        owners, gap = met, rows.gap[kept]
-        if touched and engine is not None:
-            whose, others = engine.contacts(sorted(touched))
-            owners, gap = met + whose, np.concatenate([gap, np.maximum(others.gap, SKIN)])
+        owner, gap, pair = self._owners[near.pair[contact]], rows.gap[kept], near.number[contact]
+        if engine is not None and (touched := np.unique(owner[owner < len(free)])).size:
+            others = engine.contacts([self._names[k] for k in touched.tolist()])
+            owner, gap = np.concatenate([owner, others.bodies]), np.concatenate([gap, np.maximum(others.gap, SKIN)])
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
-        bodies = sorted({name for both in owners for name in both if name in names})
-        limits = near_limits(model, self._limited, self.q, self.velocity, time)
-        count = len(owners) + len(limits)
-        made = Points.room(count, model.nv, bodies)
-        axes = axes_of(normal)
-        directions = np.concatenate([axes, cross(place[:, None], axes)], axis=2)
+            pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
+        bodies = np.unique(owner[owner < len(free)])
+        freedom, sign, room = near_limits(model, self._limited, self.q, self.velocity, time)
+        count, self.points = len(owner), len(owner) + len(freedom)
+        made = Points.room(self.points, model.nv, [self._names[k] for k in bodies.tolist()], engine)
+        made.axes[:count], made.place[:count], made.gap[:count] = axes_of(normal), place, gap
+        directions = np.concatenate([made.axes[:count], cross(place[:, None], made.axes[:count])], axis=2)
         joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
-        made.figure[: 3 * len(met)] = workspace.state.rows(directions[: len(met)].reshape(-1, 6), *joints)
-        made.gap[: len(owners)] = gap
-        for both in set(owners) - self._surfaces.keys():
-            self._surfaces[both] = surface_of(self._scene, *both)
-        made.add_owners(self._surfaces, engine, moved, owners, place, directions, time)
-        for c, (freedom, sign, room) in enumerate(limits, len(owners)):
-            made.figure[3 * c, freedom], made.gap[c] = sign, room
-        self.points = count
+        made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
+        made.restitution[:count], made.friction[:count] = self._surfaces(owner)
+        slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
+        slot[bodies] = np.arange(len(bodies))
+        centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
+        made.add_things(owner, slot, centres, twists, directions)
+        made.figure[3 * np.arange(count, self.points), freedom], made.gap[count:] = sign, room
+        # each side of each freedom counts as a pair, before those of pieces
+        made.pair[:count], made.pair[count:] = 2 * model.nv + pair, 2 * freedom + (sign < 0.0)
         return made
 
-    def _approach(self, bodies: Mapping[str, pin.SE3], moved: Moved, time: float) -> Array:
-        """How fast the pieces of every pair can approach each other (pairs,), m/s; see `approaches`."""
-        workspace, engine = self._workspace, self._engine
+    def _approach(self, moved: Array) -> Array:
+        """How fast the pieces of every pair can approach each other (pairs,), m/s; `moved` (n, 6): see `_points`."""
+        workspace, twists = self._workspace, moved
         state = workspace.state.update(self.q)
         twist = ((state.support * state.spread(self.velocity)) @ state.columns)[workspace.table.joint]
-        if engine is not None:
-            for name in bodies:
-                velocity = engine.velocity_at(name, np.zeros(3))
-                twist[self._pieces[name]] = *velocity, *engine.twist(name)[3:]
-        for name, (before, after) in moved.items():
-            twist[self._pieces[name]] = pin.log6(after * before.inverse()).vector / time
+        if self._engine is not None:
+            bodies, free = self._engine.state.bodies, len(self._engine.bodies)
+            own = bodies.twist[:free]
+            twists = moved.copy()
+            twists[:free] = np.hstack([own[:, :3] + cross(bodies.position[:free], own[:, 3:]), own[:, 3:]])
+        twist = twist + twists[self._owners]
         return approaches(workspace.table, workspace.proximity.place(state.data)[:, 3], twist)
 
     def _relative(self, points: Points) -> Array:
@@ -273,49 +278,50 @@ class Articulated:
         hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
-        return self._solved(inertia, points, speed, target, True)[0] if hit.any() else np.zeros((len(target), 3))
+        return self._solved(inertia, points, speed, target)[0] if hit.any() else np.zeros((len(target), 3))
 
     def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Array, Array]:
         """Keep points apart at the end of a step; impulses (m, 3), and the velocities (3 m,) there."""
         room = points.gap - SKIN  # a step removes a fifth of an overlap
         target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, FASTEST))
         speed = self._relative(points)
+        start = np.zeros((len(target), 3))
         if points.bodies and self._engine is not None:
-            fall = [self._engine.response(name)[:, :3] @ self._engine.weight(name) for name in points.bodies]
-            speed = speed + time * (points.things @ np.concatenate(fall))
-        return self._solved(inertia, points, speed, target)
+            weights = np.array([self._engine.weight(name) for name in points.bodies])
+            fall = np.einsum("bij,bj->bi", points.responses[:, :, :3], weights)
+            speed = speed + time * (points.things @ fall.ravel())
+        old = self._old.over(time)
+        solve_kernel.warm_start((old.pair, old.local, old.impulse), (points.pair, points.place), points.axes, start)
+        found, after = self._solved(inertia, points, speed, target, start)
+        bearing = np.flatnonzero(found[:, 0] > 0.0)
+        world = np.einsum("cr,crk->ck", found[bearing], points.axes[bearing])
+        self._old = Impulses(points.pair[bearing], points.place[bearing], world, np.zeros((0, 3)), time)
+        return found, after
 
     def _solved(
-        self, inertia: Array, points: Points, speed: Array, target: Array, blow: bool = False
+        self, inertia: Array, points: Points, speed: Array, target: Array, start: Array | None = None
     ) -> tuple[Array, Array]:
-        """Impulses (m, 3) of least normal velocities, and these (3 m,); those of a blow add no energy."""
+        """Impulses (m, 3) of least normal velocities from others, and these (3 m,); without a start, those of blows."""
         impulse, kept = np.zeros((len(target), 3)), np.flatnonzero(target > -np.inf)
         if not len(kept):
             return impulse, speed
         rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        figure, begun = points.figure[rows], speed[rows]
+        figure, things, begun = points.figure[rows], points.things[rows], speed[rows]
         mobility = impulse_kernel.mobilities(inertia, figure)
-        if points.bodies and self._engine is not None:
-            for b, name in enumerate(points.bodies):
-                part = points.things[rows, 6 * b : 6 * b + 6]
-                own = np.flatnonzero(part.any(axis=1))
-                part = part[own]
-                # without a BLAS, as `mobilities`
-                mobility[np.ix_(own, own)] += np.einsum("ik,jk->ij", part @ self._engine.response(name), part)
-        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept])
+        impulse_kernel.add_bodies(mobility, things, points.responses)
+        begin = None if start is None else start[kept]
+        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin)
         flat = found.ravel()
         gain = float(flat @ (begun + after))
-        if blow and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less of all
+        if start is None and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less
             found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
             after = begun + mobility @ found.ravel()
         impulse[kept] = found
         self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, figure.T @ found.ravel())
-        pushed = set(np.flatnonzero(impulse.any(axis=1)).tolist())
-        for name, c, place, axes in points.pushes:
-            if c in pushed:
-                push = impulse[c] @ axes
-                self._engine.push(name, push, place)  # type: ignore[union-attr]
-                self.impulses[name] = self.impulses.get(name, np.zeros(3)) + push
+        for name, wrench in zip(points.bodies, (things.T @ found.ravel()).reshape(-1, 6), strict=True):
+            if wrench.any():
+                self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]
+                self.impulses[name] = self.impulses.get(name, np.zeros(3)) + wrench[:3]
         velocities = speed.copy()
         velocities[rows] = after
         return impulse, velocities

@@ -15,16 +15,15 @@ and inertia, with what it carries; friction is capped where sliding ends.
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import exp
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices, cross
+from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
@@ -252,48 +251,49 @@ class Points(NamedTuple):
     gap: Array  # (m,) metres, radians
     friction: Array  # (m,)
     restitution: Array  # (m,)
-    pushes: list[tuple[str, int, Array, Array]]  # name of such a body, its point's number, place (3,), axes (3, 3)
+    driven: Mask  # (m,) points of what moves
+    pair: Indices  # (m,) of pieces, or limit
+    place: Array  # (m, 3) in the world
+    axes: Array  # (m, 3, 3) n, t1, t2, one a row
     bodies: list[str]  # (b,)
-    driven: NDArray[np.bool_]  # (m,) points of what moves
+    responses: Array  # (b, 6, 6) changes of their twists by unit impulses; see `RigidBodies.response`
 
     @staticmethod
-    def room(count: int, freedoms: int, bodies: list[str]) -> Points:
+    def room(count: int, freedoms: int, bodies: list[str], engine: RigidBodies | None) -> Points:
         """Points of which nothing is known yet, near bodies that move by themselves."""
         rows, one = 3 * count, np.zeros(count)
+        responses = [] if engine is None else [engine.response(name) for name in bodies]
         return Points(
             np.zeros((rows, freedoms)), np.zeros((rows, 6 * len(bodies))), np.zeros(rows), one, one.copy(), one.copy(),
-            [], bodies, np.zeros(count, dtype=bool),
+            np.zeros(count, dtype=bool), np.zeros(count, dtype=np.intp), np.zeros((count, 3)),
+            np.tile(np.eye(3), (count, 1, 1)), bodies, np.array(responses).reshape(-1, 6, 6),
         )  # fmt: skip
 
-    def add_owners(
-        self,
-        surfaces: Mapping[tuple[str, str], Surface],
-        engine: RigidBodies | None,
-        moved: Moved,
-        owners: Sequence[tuple[str, str]],
-        place: Array,
-        directions: Array,
-        time: float,
-    ) -> None:
-        """Add what the things at the first points are, whose both `owners` (k,) have names.
+    def add_things(self, owner: Indices, slot: Indices, centres: Array, twists: Array, directions: Array) -> None:
+        """Add what moves at the first k points.
 
-        `moved`: things to their placements before and after the step; `place` (k, 3) points; `directions` (k, 3, 6)
-        take a twist at the origin to velocities along the axes of each point; `time` of the step, seconds.
+        Args:
+            owner: (k, 2) numbers of both bodies at a point.
+            slot: (n,) place of a body in `bodies`; -1 where it does not move by itself.
+            centres: (b, 3) centres of mass.
+            twists: (n, 6) at the origin, of what is moved; zero for others.
+            directions: (k, 3, 6) take a twist at the origin to velocities along the axes of each point.
         """
-        places = {name: 6 * b for b, name in enumerate(self.bodies)}
-        for c, both in enumerate(owners):
-            self.restitution[c], self.friction[c] = surfaces[both]
-            for owner, sign in zip(both, (-1.0, 1.0), strict=True):
-                if owner not in places and owner not in moved:
-                    continue
-                here, axes, self.driven[c] = slice(3 * c, 3 * c + 3), directions[c, :, :3], True
-                if owner in places and engine is not None:
-                    b, turned = places[owner], directions[c, :, 3:] - cross(engine.centre(owner), axes)
-                    self.things[here, b : b + 3], self.things[here, b + 3 : b + 6] = sign * axes, sign * turned
-                    self.pushes.append((owner, c, place[c], sign * axes))
-                if owner in moved:
-                    before, after = moved[owner]
-                    self.given[here] += sign * directions[c] @ pin.log6(after * before.inverse()).vector / time
+        things, given = self.things.reshape(len(self.gap), 3, len(self.bodies), 6), self.given.reshape(-1, 3)
+        moving: Mask = (slot >= 0) | twists.any(axis=1)
+        for side, sign in enumerate((-1.0, 1.0)):
+            whose = owner[:, side]
+            c = np.flatnonzero(slot[whose] >= 0)
+            b, axes = slot[whose[c]], directions[c, :, :3]
+            things[c, :, b, :3] = sign * axes
+            things[c, :, b, 3:] = sign * (directions[c, :, 3:] - cross(centres[b][:, None], axes))
+            given[: len(owner)] += sign * np.einsum("crk,ck->cr", directions, twists[whose])
+            self.driven[: len(owner)] |= moving[whose]
+
+    def held(self, impulse: Array) -> set[str]:
+        """Names of the bodies that impulses (m, 3) act on."""
+        acted = self.things.reshape(len(self.gap), 3, len(self.bodies), 6)[impulse.any(axis=1)].any(axis=(0, 1, 3))
+        return {self.bodies[b] for b in np.flatnonzero(acted).tolist()}
 
 
 def axes_of(normal: Array) -> Array:
@@ -305,12 +305,12 @@ def axes_of(normal: Array) -> Array:
 
 def near_limits(
     model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
-) -> list[tuple[int, float, float]]:
+) -> tuple[Indices, Array, Array]:
     """Of `limited` (k, 2): places in q, velocity: that can come to a limit, the sign away from it, and how far."""
     at, freedom = limited.T
-    gaps = q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]
-    near = [gap < 0.02 + 1.5 * time * np.abs(velocity[freedom]) for gap in gaps]  # rad, m
-    return [(freedom[k], sign, gaps[s][k]) for s, sign in enumerate((1.0, -1.0)) for k in np.flatnonzero(near[s])]
+    gaps: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
+    side, which = np.nonzero(gaps < 0.02 + 1.5 * time * np.abs(velocity[freedom]))  # rad, m
+    return freedom[which], np.array([1.0, -1.0])[side], gaps[side, which]
 
 
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:

@@ -41,6 +41,34 @@ def mobilities(inertia: Array, rows: Array) -> Array:
     return found
 
 
+@compiled(error_model="numpy", fastmath=FAST)
+def add_bodies(mobility: Array, rows: Array, responses: Array) -> None:
+    """Add to mobilities (k, k) what bodies do with responses (b, 6, 6) to impulses, along rows (k, 6 b)."""
+    count, scaled = rows.shape[0], np.empty(6)
+    own = np.empty(count, np.intp)
+    for b in range(len(responses)):
+        number = 0
+        for c in range(count):
+            some = 0.0
+            for k in range(6 * b, 6 * b + 6):
+                some += abs(rows[c, k])
+            if some > 0.0:
+                own[number] = c
+                number += 1
+        for one in range(number):
+            for k in range(6):
+                scaled[k] = 0.0
+                for i in range(6):
+                    scaled[k] += rows[own[one], 6 * b + i] * responses[b, i, k]
+            for other in range(one + 1):
+                total = 0.0
+                for k in range(6):
+                    total += scaled[k] * rows[own[other], 6 * b + k]
+                mobility[own[one], own[other]] += total
+                if other < one:
+                    mobility[own[other], own[one]] += total
+
+
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
 def _push(row: int, one: float, two: float, three: float, mobility: Array, velocity: Array) -> None:
     """Change all velocities by an impulse at the point of three rows; the matrix is symmetric, and read by rows."""
@@ -49,8 +77,10 @@ def _push(row: int, one: float, two: float, three: float, mobility: Array, veloc
 
 
 @compiled(error_model="numpy", fastmath=FAST)
-def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most: int, tolerance: float) -> Array:
-    """Impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both axes of friction together.
+def solve(
+    mobility: Array, velocity: Array, laws: tuple[Array, Array], impulse: Array, most: int, tolerance: float
+) -> None:
+    """Change impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both frictions together.
 
     At every point 0 <= p_n is complementary to u_n - target >= 0, and p_t is at most friction p_n against the sliding.
     Sweeps go over points that approach or did so before, a few of those that are near.
@@ -58,14 +88,25 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
     Args:
         mobility: (3 m, 3 m) change of the velocities by unit impulses.
         velocity: (3 m,) without impulses, m/s: along the normal, then two tangents. It becomes that with them.
-        friction: (m,).
-        target: (m,) least velocities along the normals, m/s.
+        laws: friction (m,), and the least velocities (m,) along the normals, m/s.
+        impulse: to begin with.
         most: sweeps.
         tolerance: change of all velocities at which it ends, in two sweeps, one each way, m/s.
     """
-    count, impulse = len(friction), np.zeros((len(friction), 3))
+    friction, target = laws
+    count = len(friction)
     chosen, number, sweeps, some, calm = np.empty(count, np.intp), 0, 0, 8, False
     waits = np.ones(count, np.bool_)
+    for c in range(count):
+        if impulse[c, 0] > 0.0 and mobility[3 * c, 3 * c] > 1e-12:
+            chosen[number], waits[c] = c, False
+            number += 1
+            size, bound = np.sqrt(impulse[c, 1] ** 2 + impulse[c, 2] ** 2), friction[c] * impulse[c, 0]
+            if size > bound:  # as where the normal has turned
+                impulse[c, 1], impulse[c, 2] = impulse[c, 1] * (bound / size), impulse[c, 2] * (bound / size)
+            _push(3 * c, impulse[c, 0], impulse[c, 1], impulse[c, 2], mobility, velocity)
+        else:
+            impulse[c, 0], impulse[c, 1], impulse[c, 2] = 0.0, 0.0, 0.0
     while True:
         before = number
         for c in range(count):
@@ -73,7 +114,7 @@ def solve(mobility: Array, velocity: Array, friction: Array, target: Array, most
                 chosen[number], waits[c] = c, False
                 number += 1
         if sweeps >= most or (calm and number == before) or number == 0:
-            return impulse
+            return
         among = np.empty((3 * number, 3 * number))
         for c in range(number):
             for d in range(number):
@@ -218,10 +259,16 @@ def by_inertia(inertia: Array, momentum: Array) -> Array:
     return np.asarray(velocity if known else np.linalg.solve(inertia, momentum))
 
 
-def impulses(mobility: Array, speed: Array, friction: Array, target: Array) -> tuple[Array, Array]:
-    """Impulses (m, 3) along the axes of m points, and the velocities (3 m,) with them; arguments as of `solve`."""
-    velocity = speed.copy()
-    impulse = solve(mobility, velocity, friction, target, 1000, 1e-7)
+def impulses(
+    mobility: Array, speed: Array, friction: Array, target: Array, start: Array | None = None
+) -> tuple[Array, Array]:
+    """Impulses (m, 3) along the axes of m points, and the velocities (3 m,) with them; arguments as of `solve`.
+
+    With those of the step before as a `start`, 1e-6 m/s is exact enough, and the next step goes on from there.
+    """
+    velocity, impulse = speed.copy(), np.zeros((len(friction), 3)) if start is None else start.copy()
+    most, tolerance = (1000, 1e-7) if start is None else (500, 1e-6)
+    solve(mobility, velocity, (friction, target), impulse, most, tolerance)
     if violation(mobility, velocity, friction, target, impulse) > COARSE:
         impulse = _refined(mobility, speed, friction, target, impulse)
         velocity = speed + mobility @ impulse.ravel()
@@ -257,6 +304,7 @@ def compiled_kernel(_: Any) -> None:
     eye, three, one = np.eye(3), np.zeros(3), np.zeros(1)
     mobilities(eye, eye)
     _by_cholesky(eye, three)
-    solve(eye, three, one, one, 1, 1e-9)
+    add_bodies(eye, np.zeros((3, 6)), np.zeros((1, 6, 6)))
+    solve(eye, three, (one, one), np.zeros((1, 3)), 1, 1e-9)
     _split(eye, np.ones(3), three, one, three.copy(), three.copy(), 1)
     violation(eye, three, one, one, np.zeros((1, 3)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,21 @@ def surface_of(scene: Scene, first: str, second: str) -> Surface:
     """What happens where two segments or things touch."""
     one, other = (scene.objects[name].material if name in scene.objects else HUMAN for name in (first, second))
     return surface(one, other)
+
+
+class Surfaces:
+    """What happens where two of so many named bodies touch, asked once for each two."""
+
+    def __init__(self, scene: Scene, names: Sequence[str]) -> None:
+        self._scene, self._names, self._known = scene, names, dict[tuple[int, int], Surface]()
+
+    def __call__(self, both: Indices) -> tuple[Array, Array]:
+        """Restitution and friction (k,) of bodies (k, 2)."""
+        pairs, known = [(first, second) for first, second in both.tolist()], self._known
+        for first, second in set(pairs) - known.keys():
+            known[first, second] = surface_of(self._scene, self._names[first], self._names[second])
+        found = np.array([known[pair] for pair in pairs]).reshape(-1, 2)
+        return found[:, 0], found[:, 1]
 
 
 class PlacedProximity(Proximity):

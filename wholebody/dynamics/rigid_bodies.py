@@ -142,20 +142,22 @@ class RigidBodies:
 
     def push(self, name: str, impulse: Array, point: Array) -> None:
         """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes."""
-        number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        impulse = _bounded(impulse, 1e6, "impulse")
+        lever, impulse = _bounded(point, FARTHEST, "point") - self.centre(name), _bounded(impulse, 1e6, "impulse")
+        self.push_about_centre(name, np.concatenate([impulse, pin.skew(lever) @ impulse]))
+
+    def push_about_centre(self, name: str, wrench: Array) -> None:
+        """The same with an impulse and an angular impulse about the body's centre of mass, (6,), N s and N m s."""
+        number, twist = self._number(name), self.state.bodies.twist
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        lever, jointed = point - self.state.bodies.position[number], self.state.bodies.jointed[number]
-        before = self.energy() if jointed else 0.5 * float(impulse @ self._velocity(number, lever))
-        self.state.velocity[number] += impulse / self._pieces.mass[number]
-        self.state.spin[number] += self._inverse_inertia(number) @ (pin.skew(lever) @ impulse)
+        before = twist[number].copy()
+        self.state.velocity[number] += wrench[:3] / self._pieces.mass[number]
+        self.state.spin[number] += self._inverse_inertia(number) @ wrench[3:]
         self.state.bodies.moving[self._joints.linked(number)] = True
-        if jointed:
-            self._joints.project_velocities(self.state, self.state.bodies.twist, self.state.bodies.moving)
-            self._pushed += self.energy() - before
-        else:  # along the mean of the velocities before and after
-            self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
+        if self.state.bodies.jointed[number]:
+            self._joints.project_velocities(self.state, twist, self.state.bodies.moving)
+        # along the mean of both velocities, where joints, which hold in both, do no work
+        self._pushed += 0.5 * float(wrench @ (before + twist[number]))
 
     def put(self, name: str, at: PlacementLike) -> None:
         """Put a body elsewhere, with its velocity; it wakes, and what lay on it. What that raises is work."""
@@ -226,12 +228,11 @@ class RigidBodies:
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
 
-    def contacts(self, names: Collection[str]) -> tuple[list[tuple[str, str]], ContactPoints]:
-        """Points at which bodies with these names, and those that touch them in turn, can touch other things: whose."""
+    def contacts(self, names: Collection[str]) -> ContactPoints:
+        """Points at which bodies with these names, and those that touch them in turn, can touch other things."""
         linked = np.zeros(len(self.names), dtype=bool)
         linked[[self._number(name) for name in checks.listed(names, "names", "['ball']")]] = True
-        found = self._finder.points(self._near).linked(linked, self._pieces.dynamic, self._things, 2.0 * SKIN)
-        return [(self.names[a], self.names[b]) for a, b in found.bodies.tolist()], found
+        return self._finder.points(self._near).linked(linked, self._pieces.dynamic, self._things, 2.0 * SKIN)
 
     def way_back(self) -> Callable[[], None]:
         """A function that takes back what is advanced from now on."""

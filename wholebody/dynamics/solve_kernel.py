@@ -254,7 +254,7 @@ def solve_from(
 ) -> tuple[float, float]:
     """Solve the program of all points from the impulses of the step before; returns the residuals."""
     impulse[: len(laws.target)] = 0.0
-    _warm_start(old, new, rows.axes, impulse)
+    warm_start(old, new, rows.axes, impulse)
     for c in range(len(impulse)):
         for row in range(3):
             if impulse[c, row] != 0.0:
@@ -263,8 +263,8 @@ def solve_from(
     return residuals(rows, laws, twist, impulse)
 
 
-@compiled(inner=True)
-def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
+@compiled()
+def warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
     """Write the impulses of the nearest old points (pair, place in the first body's axes, impulse) of a pair."""
     # Witness points jump from corner to corner: an old point nearest to none gives to the nearest within 0.01 m.
     pair, local, world = old
