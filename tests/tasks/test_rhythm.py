@@ -217,6 +217,20 @@ def test_who_sits_has_knees_where_the_pedals_are(scene: wb.Scene) -> None:
     assert rhythm.value(state.update(crouched)) > at_start + 1.0
 
 
+def test_the_way_to_a_seat_is_no_effort_of_who_sits(scene: wb.Scene) -> None:
+    """Drivers choose a seat's place for their limbs, not for its distance to where the world has its origin."""
+    car = wb.Scene({"anna": scene.figure, "bo": scene.figure}).add(wb.Box((0.5, 0.5, 0.1)), name="seat", at=(0, 0, 0.3))
+    start = car.figure.posture({"anna": "sitting", "bo": "standing"})
+    effort = wb.Problem(car, start, goals=[wb.Sit("seat", pelvis="anna/pelvis", trunk="anna/thorax")]).measures[0]
+    state = State(car.model)
+    for who, least in (("anna", 0.0), ("bo", 5.0)):
+        moved = start.copy()
+        moved[car.model.joints[car.figure.roots[f"{who}/root"]].idx_q] += 1.0
+        assert effort.value(state.update(moved)) == pytest.approx(least)
+    bent = car.figure.with_joints(start, {"anna/right_elbow_flexion": math.radians(20.0) + 0.5})
+    assert effort.value(state.update(bent)) == pytest.approx(0.25)
+
+
 @lru_cache(maxsize=3)
 def lifted(style: str) -> tuple[wb.Figure, np.ndarray]:
     """A man at a box on the floor."""
