@@ -25,9 +25,10 @@ GROUPS = {
     "lumbar spine's flexion": ("spine1_flexion", "spine2_flexion", "spine3_flexion"),
     "hip's flexion": ("hip_flexion",),
     "knee and ankle": ("knee_flexion", "ankle_dorsiflexion"),
-    "neck": ("neck1_flexion", "neck2_flexion"),
 }
-"""Joints, by the ends of their names, whose weights are multiplied by one factor. That of elbows is the unit."""
+"""Joints, by the ends of their names, whose weights are multiplied by one factor. That of elbows is the unit. Necks are
+left out: no angle of the table is theirs.
+"""
 
 SHARES = {"lumbar spine's share": "lumbar_weight", "knee's share": "knee_weight"}
 """Weights of `Rhythm` that are multiplied by one factor each."""
@@ -42,6 +43,10 @@ PRIOR = 0.02  # of the square of each logarithm: a factor that nothing asks for 
 FAR = 3.0  # standard deviations: what is further off counts hardly more, since its task is stated otherwise than it was
 
 
+HELD = ("fingers' flexion", "fingers' abduction")
+"""Groups that stay: typing asks for twice the weights of fingers, with which fewer grasps are found."""
+
+
 class Fitted(NamedTuple):
     """What to change of present weights and angles by group, and the rows of both halves with it."""
 
@@ -49,7 +54,7 @@ class Fitted(NamedTuple):
     rows: list[PostureRow]
 
 
-def fit(told: Callable[[str], None], held: Collection[str] = ()) -> Fitted:
+def fit(told: Callable[[str], None], held: Collection[str] = HELD) -> Fitted:
     """Change the factor that brings the postures of half "fit" nearest to people's, one after the other; say which.
 
     Args:
