@@ -180,14 +180,33 @@ def test_stance_counts_what_the_feet_are_off_side_by_side() -> None:
         left, right = (person.placement(q, f"{side}_foot") for side in ("left", "right"))
         return stance.value(State(person.model).update(q)), left.translation - right.translation, left.rotation
 
-    assert value()[0] < 1e-12
+    assert value()[0] == pytest.approx(60.0 * 0.001**2)  # the right foot would be 1 mm ahead
     split, way, _ = value(left_hip_flexion=20.0, left_ankle_dorsiflexion=-20.0)
-    assert split == pytest.approx(60.0 * way[0] ** 2, rel=1e-9)
+    assert split == pytest.approx(60.0 * (way[0] + 0.001) ** 2, rel=1e-9)
     wide, way, _ = value(left_hip_abduction=10.0, right_hip_abduction=10.0)
     turned = np.cos(np.radians(10.0)) * way[1]  # as either foot sees it, which the leg has tipped by ten degrees
-    assert wide == pytest.approx(60.0 * (turned - apart) ** 2, rel=1e-6)
-    mirrored = value(right_hip_flexion=20.0, right_ankle_dorsiflexion=-20.0)[0]
-    assert mirrored == pytest.approx(split, rel=1e-9)
+    assert wide == pytest.approx(60.0 * ((turned - apart) ** 2 + 0.001**2), rel=1e-6)
+    mirrored, way, _ = value(right_hip_flexion=20.0, right_ankle_dorsiflexion=-20.0)
+    assert mirrored == pytest.approx(60.0 * (way[0] + 0.001) ** 2, rel=1e-9)
+    assert mirrored < split
+
+
+def test_of_a_split_stance_and_its_mirror_image_one_is_taken() -> None:
+    """A box on the median plane: nothing but the measure says which foot goes ahead."""
+    person = wb.load("human", percentile=5)
+    ahead = []
+    for height in (0.20, 0.25):
+        scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
+        scene.add(wb.Box((0.30, 0.40, 0.30)), name="box", at=(0.45, 0.0, height))
+        goals: list[wb.tasks.Goal] = []
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            goals.append(wb.Point(f"{side}_palm", (0.45, 0.2005 * sign, height)))
+            goals.append(wb.Axis(f"{side}_palm", (0, 0, 1), direction=(0, -sign, 0), weight=0.1))
+        solution = wb.solve(wb.Problem(scene, goals=goals, constraints=[wb.Stand("floor")]))
+        left, right = (person.placement(solution.q, f"{side}_foot").translation for side in ("left", "right"))
+        assert solution.solved
+        ahead.append(right[0] - left[0])
+    assert min(ahead) > 0.05
 
 
 def test_stance_has_derivatives_and_two_feet() -> None:

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.audits import human_postures
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import Hang
@@ -177,12 +178,13 @@ def test_one_raised_arm_hardly_bends_the_spine_sideways(scene: wb.Scene) -> None
     assert abs(sum(bend)) < 9.0  # with the lumbar spine, of which the source says nothing
 
 
-def test_both_arms_overhead_extend_the_thorax_as_people_do(scene: wb.Scene) -> None:
+def test_both_arms_at_the_end_of_their_range_extend_the_thorax_as_people_do(scene: wb.Scene) -> None:
     """By 12.8 degrees, standard deviation 7.6, on radiographs of 21 men (Edmondston et al. 2012)."""
-    goals = [wb.Point(f"{side}_index_tip", (0.15, sign * 0.15, 2.15)) for side, sign in (("left", 1), ("right", -1))]
-    angles = taken(scene, *goals)
-    thorax = -sum(angles[f"spine{level}_flexion"] for level in (3, 4))
-    assert 12.8 - 7.6 < thorax < 12.8 + 7.6
+    solution = wb.solve(human_postures.overhead(scene.figure))
+    angles = {name: math.degrees(angle) for name, angle in scene.figure.joint_values(solution.q).items()}
+    assert solution.solved
+    assert min(angles[f"{side}_shoulder_flexion"] for side in ("left", "right")) > 150.0
+    assert 12.8 - 7.6 < -sum(angles[f"spine{level}_flexion"] for level in (3, 4)) < 12.8 + 7.6
 
 
 def test_its_squares_are_its_value_and_their_rows_their_derivatives(scene: wb.Scene) -> None:
@@ -215,6 +217,20 @@ def test_who_sits_has_knees_where_the_pedals_are(scene: wb.Scene) -> None:
     at_start = rhythm.value(state.update(start))
     assert rhythm.value(state.update(reclined)) == pytest.approx(at_start, abs=1e-12)
     assert rhythm.value(state.update(crouched)) > at_start + 1.0
+
+
+def test_the_way_to_a_seat_is_no_effort_of_who_sits(scene: wb.Scene) -> None:
+    """Drivers choose a seat's place for their limbs, not for its distance to where the world has its origin."""
+    car = wb.Scene({"anna": scene.figure, "bo": scene.figure}).add(wb.Box((0.5, 0.5, 0.1)), name="seat", at=(0, 0, 0.3))
+    start = car.figure.posture({"anna": "sitting", "bo": "standing"})
+    effort = wb.Problem(car, start, goals=[wb.Sit("seat", pelvis="anna/pelvis", trunk="anna/thorax")]).measures[0]
+    state = State(car.model)
+    for who, least in (("anna", 0.0), ("bo", 5.0)):
+        moved = start.copy()
+        moved[car.model.joints[car.figure.roots[f"{who}/root"]].idx_q] += 1.0
+        assert effort.value(state.update(moved)) == pytest.approx(least)
+    bent = car.figure.with_joints(start, {"anna/right_elbow_flexion": math.radians(20.0) + 0.5})
+    assert effort.value(state.update(bent)) == pytest.approx(0.25)
 
 
 @lru_cache(maxsize=3)

@@ -63,27 +63,35 @@ def default_measures(
 
     `hanging` are arms that hang, see `free_arms`. `seated` are the persons who sit, by what their names begin with. The
     shares of knees and lumbar spine are those of somebody who bends down on both feet: on a seat the knees follow the
-    pedals, and who leans back bends no lordosis.
+    pedals, and who leans back bends no lordosis. How far the seat is from the start is no effort of theirs either.
     """
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
     shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
     pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
-    rhythm = _rhythm.resolve(scene, rest)
+    effort, rhythm = _effort.resolve(scene, rest), _rhythm.resolve(scene, rest)
     if seated:
+        effort = effort.apart_from(_ways(scene, seated))
         rhythm = rhythm.of_arms(inputs.once(scene, ("places", seated), partial(_places, scene, seated)))
 
     def kept(kind: type[Stance | Hang], names: tuple[str, ...]) -> Measure:  # whatever the start is, it is the same
         return inputs.once(scene, (kind, names), lambda: kind(names).resolve(scene, rest))
 
     free = [kept(Hang, hanging)] if hanging else []
-    return (_effort.resolve(scene, rest), rhythm, *(kept(Stance, pair) for pair in pairs), *free)
+    return (effort, rhythm, *(kept(Stance, pair) for pair in pairs), *free)
 
 
 def _places(scene: Scene, bodies: Sequence[str]) -> frozenset[int]:
     """First places in the tangent of the joints of persons."""
     return frozenset(int(scene.model.joints[joint].idx_v) for body in bodies for joint in scene.figure.bodies[body])
+
+
+def _ways(scene: Scene, bodies: Sequence[str]) -> list[int]:
+    """Places in the tangent of the translation of the free roots of persons."""
+    roots = [scene.figure.roots[root] for body in bodies if (root := f"{body}root") in scene.figure.roots]
+    firsts = [int(scene.model.joints[root].idx_v) for root in roots]
+    return [first + axis for first in firsts for axis in range(3)]
 
 
 def seated(scene: Scene, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -136,6 +137,12 @@ class Effort(DistanceMeasure):
     def resolve(self, scene: Scene, start: Array) -> Effort:
         """Store the start."""
         return filled(self, distance=SquaredDistance.build(start, scene.figure.effort_weights))
+
+    def apart_from(self, idx_v: Sequence[int]) -> Effort:
+        """Itself, resolved, without the displacement of those degrees of freedom."""
+        weights = self.distance.weights.copy()
+        weights[list(idx_v)] = 0.0
+        return filled(self, distance=SquaredDistance.build(self.distance.reference, weights))
 
 
 @dataclass(frozen=True, eq=False)

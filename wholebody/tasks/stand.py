@@ -27,6 +27,7 @@ from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, 
 
 FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
+LEADS = 0.001  # m by which the right foot is rather ahead: of a split stance and its mirror image one is lower
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,7 @@ class Stance(SumOfSquares):
         feet: the two feet.
         weight: factor on the measure.
         places: of the two, once resolved.
-        rest: (3,) f, w and t in the posture.
+        rest: (3,) f, w and t in the posture; f is 1 mm more, so that a split stance has one side, not that of rounding.
 
     Raises:
         InputError: a value of the wrong kind, shape or range.
@@ -170,7 +171,8 @@ class Stance(SumOfSquares):
         places = tuple(inputs.find_place(scene, foot, "Stance") for foot in self.feet)
         found = filled(self, places=places, rest=np.zeros(3))
         with scene.figure.posed(scene.figure.neutral) as upright:
-            return filled(found, rest=found.squares(upright)[0] / np.sqrt(STANCE_WEIGHTS))
+            rest = found.squares(upright)[0] / np.sqrt(STANCE_WEIGHTS)
+        return filled(found, rest=rest + (LEADS, 0.0, 0.0))
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (3,) and their derivatives (3, nv)."""
