@@ -19,7 +19,8 @@ from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.holds import Holds, Touched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import NOTHING, Foothold
-from wholebody.motion.thing_contacts import ThingContact, Things, surface_of, thickness
+from wholebody.motion.surfaces import surface_of
+from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
 BOX = coal.Box(*SIZE)
@@ -212,7 +213,7 @@ def test_the_thickness_of_a_part_whose_pieces_lie_beside_each_other() -> None:
 
 def test_the_floor_is_below_a_place_right_beside_a_table() -> None:
     scene = among(wb.load("hand"), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])))
-    height = surface_of(scene, ())
+    height = surface_of(scene)
     assert height(np.array([0.0, 0.0, 1.6])) == pytest.approx(1.0 + 0.5 * SIZE[2], abs=1e-3)
     assert height(np.array([0.5 * SIZE[0] + 2e-3, 0.0, 1.6])) == pytest.approx(0.0, abs=1e-3)
     assert height(np.array([0.0, 0.0, 1.0])) is None  # inside of the table

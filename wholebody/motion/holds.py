@@ -8,7 +8,7 @@ with it.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import coal
 import numpy as np
@@ -18,7 +18,8 @@ from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import CLEARANCE
-from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
+from wholebody.motion.standing_ground import HANGS, MOST_FRAMES, Foothold, Ground
+from wholebody.motion.surfaces import Surface
 from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
 from wholebody.motion.windows import long_runs, runs
 
@@ -28,7 +29,6 @@ TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyond an edge
-HANGS = 0.15  # m: what seems to rest and has all surfaces so far below it hangs, as legs do of who lies on an edge
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -96,7 +96,7 @@ class Holds:
         ground: Ground,
         scale: float,
         dt: float,
-        surface: Callable[[Array], float | None] | None,
+        surface: Surface | None,
         touched: Touched | None = None,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
