@@ -18,6 +18,7 @@ from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import CLEARANCE
+from wholebody.motion.roles import figure_roles
 from wholebody.motion.standing_ground import HANGS, MOST_FRAMES, Foothold, Ground
 from wholebody.motion.surfaces import Surface
 from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
@@ -29,6 +30,8 @@ TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyond an edge
+NEXT = "shoulder", "elbow", "knee", "ankle", "toe"  # where another part of a body begins: thighs sit
+BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -40,7 +43,13 @@ class Touched:
 
     def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
         self.things, self.contacts, self._figure = things, contacts, figure
-        self._data = figure.model.createData()
+        self._data, own = figure.model.createData(), figure_roles(figure)
+        ends = [frame for role, frame in own.items() if role.split("_")[-1] in NEXT]
+        self._ends = set[int]()  # joints at which another part of the body begins
+        for at in (figure.model.frames[figure.frame_id(frame)] for frame in ends):
+            far = np.linalg.norm(at.placement.translation) > 1e-6  # the end of what the joint before carries
+            here = at.parentJoint
+            self._ends |= set(np.flatnonzero(np.array(figure.model.parents) == here).tolist()) if far else {here}
 
     def at(self, contact: ThingContact, frame: int) -> pin.SE3:
         """Where a thing is in a frame; what is held in the axes of a part of the body stays in these."""
@@ -76,14 +85,15 @@ class Touched:
         return [ball, *self._carried(limb, 0)]
 
     def _carried(self, joint: int, most: int = 100) -> list[Placed]:
-        """Pieces on a joint and beyond it, over `most` joints with pieces at most."""
+        """Pieces on a joint and beyond it to the next part of the body, over `most` joints with pieces at most."""
         model, geometry = self._figure.model, self._figure.geometry.geometryObjects
         bearing = {piece.parentJoint for piece in geometry}
         return [
             (piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement)
             for piece in geometry
             if joint in (line := list(model.supports[piece.parentJoint]))
-            and len(bearing & set(line[line.index(joint) + 1 :])) <= most
+            and len(bearing & (beyond := set(line[line.index(joint) + 1 :]))) <= most
+            and not beyond & self._ends
         ]
 
 
@@ -201,9 +211,11 @@ class Holds:
                 gone = np.array([(number, frame) in self._let_go for frame in frames]) | (gaps > OUT_OF_REACH)
                 if gone.any():
                     spans = [f"{contact.first + run.first} to {contact.first + run.end - 1}" for run in runs(gone)]
+                    far = gaps[gone].max()
+                    how = f"is up to {1e3 * far:.0f} mm away" if far > BY else "touches it at another place"
                     reports.append(
                         f"{contact.role} does not reach {contact.thing} in frames {' and '.join(spans)} "
-                        f"(in the clip it is up to {1e3 * gaps[gone].max():.0f} mm away)"
+                        f"(in the clip it {how})"
                     )
         return "; ".join(reports)
 
