@@ -307,7 +307,7 @@ def test_a_hand_on_a_seat_is_no_pelvis_on_it() -> None:
             away[part] = min(away.get(part, np.inf), float(distance))
     contact = ThingContact("pelvis", 0, 1, "ball", np.array([0.0, -0.1, 0.0]), np.array([0.0, -1.0, 0.0]))
     touched, point = Touched(figure, Things(scene, {}), [contact]), HeldPoint("pelvis", "", 1, np.zeros(3))
-    gap = touched.gap(contact, point, 0, q)
+    gap = touched.gap(contact, point, 0, q, alone=True)
     trunk = (gap for part, gap in away.items() if re.search("pelvis|thigh|lumbar|thorax", part))
     assert gap == pytest.approx(min(trunk), abs=0.02)  # m: by which flesh that spreads only on a seat is wider
     assert gap > away["left_hand"] + 0.03

@@ -65,27 +65,30 @@ class Touched:
             away = contact.away
         return contact.place + (CLEARANCE + away) * contact.normal
 
-    def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
-        """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
+    def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array, alone: bool = False) -> float:
+        """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres.
+
+        `alone`: without further parts of the body, as are the hands of somebody who sits.
+        """
         pin.forwardKinematics(self._figure.model, self._data, q)
-        own = self._part(point.joint, point.place, contact.away)
+        own = self._part(point.joint, point.place, contact.away, alone=alone)
         if not contact.base:
             return least_distance(own, self.things.pieces(contact.thing, frame))
         center = contact.place - contact.away * contact.normal
         other = self._part(contact.base, center, contact.away, most=int(contact.thing.endswith("hand")))
         return least_distance(own, other)
 
-    def _part(self, joint: int, center: Array, radius: float, most: int = 100) -> list[Placed]:
+    def _part(self, joint: int, center: Array, radius: float, most: int = 100, alone: bool = False) -> list[Placed]:
         """What a joint carries; where that is nothing, a ball about a place (3,), and the limb before it."""
-        if carried := self._carried(joint, most):
+        if carried := self._carried(joint, most, alone):
             return carried
         ball = coal.Sphere(max(radius, 1e-6)), self._data.oMi[joint] * pin.SE3(np.eye(3), center)
         bearing = {piece.parentJoint for piece in self._figure.geometry.geometryObjects}
         limb = max(bearing & set(self._figure.model.supports[joint]), default=joint)
         return [ball, *self._carried(limb, 0)]
 
-    def _carried(self, joint: int, most: int = 100) -> list[Placed]:
-        """Pieces on a joint and beyond it to the next part of the body, over `most` joints with pieces at most."""
+    def _carried(self, joint: int, most: int = 100, alone: bool = False) -> list[Placed]:
+        """Pieces on a joint and beyond it, over `most` joints with pieces at most; `alone`: to the body's next part."""
         model, geometry = self._figure.model, self._figure.geometry.geometryObjects
         bearing = {piece.parentJoint for piece in geometry}
         return [
@@ -93,7 +96,7 @@ class Touched:
             for piece in geometry
             if joint in (line := list(model.supports[piece.parentJoint]))
             and len(bearing & (beyond := set(line[line.index(joint) + 1 :]))) <= most
-            and not beyond & self._ends
+            and not (alone and beyond & self._ends)
         ]
 
 
@@ -207,7 +210,7 @@ class Holds:
                 if not point.thing or (point.role, point.share, point.base) != key:
                     continue
                 frames = range(contact.first, min(contact.end, len(q)))
-                gaps = np.array([touched.gap(contact, point, frame, q[frame]) for frame in frames])
+                gaps = np.array([touched.gap(contact, point, frame, q[frame], alone=True) for frame in frames])
                 gone = np.array([(number, frame) in self._let_go for frame in frames]) | (gaps > OUT_OF_REACH)
                 if gone.any():
                     spans = [f"{contact.first + run.first} to {contact.first + run.end - 1}" for run in runs(gone)]
