@@ -686,7 +686,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
     named = {"skeleton": {"left_ankle": "a"}, "figure": {"left_ankle": "link4"}}
-    yield "ground", Call(wb.motion.ground, {"motion": skeleton, "names": named}, str)
+    yield "ground", Call(wb.motion.ground, {"motion": skeleton, "names": named, "scene": wb.Scene(arm)}, str)
     stood = wb.motion.ground(skeleton, named)
     yield "Ground.below", Call(stood.below, {"frames": 3})
     yield "Ground.chart", Call(stood.chart, {"path": path / "ground.png"})

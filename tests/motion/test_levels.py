@@ -82,6 +82,33 @@ def test_feet_that_hang_over_an_edge_are_not_drawn_to_the_floor(human: wb.Figure
     assert places(clip, "left_heel")[:, 2].min() > 0.5
 
 
+def test_what_is_far_above_all_that_the_scene_has_below_it_does_not_rest(human: wb.Figure) -> None:
+    """A foot is set on something 0.3 m high for a second; it rests where a box of that height is, and else hangs."""
+    motion, _ = walker(flat, 3.0)
+    at, names, frames = np.repeat(motion.positions[:1], 90, axis=0), motion.names, np.arange(90)
+    up = np.interp(frames, [20, 30, 60, 70], [0.0, 1.0, 1.0, 0.0])
+    for joint in ("left_ankle", "left_foot", "left_knee"):
+        at[:, names.index(joint), 2] += 0.3 * up + 0.25 * np.sin(np.pi * up)
+    raised, foot = dataclasses.replace(motion, positions=at), at[45, names.index("left_ankle")]
+    floor = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    assert wb.motion.ground(raised).rests["left_ankle"][35:55].all()
+    assert not wb.motion.ground(raised, scene=floor).rests["left_ankle"][25:65].any()
+    assert wb.motion.ground(raised, scene=floor).rests["right_ankle"].all()
+    floor.add(wb.Box((0.5, 0.2, 0.3)), name="box", at=(foot[0], foot[1], 0.15))
+    found = wb.motion.ground(raised, scene=floor)
+    assert found.rests["left_ankle"][35:55].all()
+    assert found.levels == (0.0, 0.3)
+
+
+def test_who_stands_on_a_box_all_the_time_stands_on_it_in_the_scene(human: wb.Figure) -> None:
+    low = person(20, 1.1)
+    high = dataclasses.replace(low, positions=low.positions + [0.0, 0.0, 0.5])
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor").add(wb.Box((2.0, 2.0, 0.5)), name="box", at=(0, 0, 0.25))
+    clip = wb.retarget(high, human, scene)
+    assert np.abs(places(clip, "left_heel")[:, 2] - 0.5).max() < 3e-3
+    assert wb.check(clip, scene).deepest < 1e-3
+
+
 def test_a_skeleton_whose_axes_do_not_turn_with_its_feet_keeps_their_directions(human: wb.Figure) -> None:
     """Places alone, as of markers: a person turns round by 180 degrees, and the axes of its joints stay."""
     count = 50

@@ -19,7 +19,8 @@ from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.holds import Holds, Touched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import NOTHING, Foothold
-from wholebody.motion.thing_contacts import ThingContact, Things, surface_of, thickness
+from wholebody.motion.surfaces import surface_of
+from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
 BOX = coal.Box(*SIZE)
@@ -212,7 +213,7 @@ def test_the_thickness_of_a_part_whose_pieces_lie_beside_each_other() -> None:
 
 def test_the_floor_is_below_a_place_right_beside_a_table() -> None:
     scene = among(wb.load("hand"), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])))
-    height = surface_of(scene, ())
+    height = surface_of(scene)
     assert height(np.array([0.0, 0.0, 1.6])) == pytest.approx(1.0 + 0.5 * SIZE[2], abs=1e-3)
     assert height(np.array([0.5 * SIZE[0] + 2e-3, 0.0, 1.6])) == pytest.approx(0.0, abs=1e-3)
     assert height(np.array([0.0, 0.0, 1.0])) is None  # inside of the table
@@ -289,6 +290,27 @@ def test_what_is_let_go_of_in_any_run_is_told_frame_by_frame() -> None:
         assert held.give_up()
     assert not held.give_up()
     assert "left_hand does not reach box in frames 20 to 21 and 28 to 29" in held.let_go(np.tile(q, (40, 1)))
+
+
+def test_a_hand_on_a_seat_is_no_pelvis_on_it() -> None:
+    """A ball is beside the left hand of a person who stands; the thigh sits with the pelvis, the hand does not."""
+    figure = wb.load("human")
+    q, data = figure.posture("standing"), figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, q)
+    x, y, z = data.oMf[figure.frame_id("left_hand")].translation
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(x, y + 0.2, z))
+    found, away = scene.contacts(q, within=0.5), dict[str, float]()
+    for pair, distance in zip(found.pair, found.distance, strict=True):
+        owners = {scene.piece_owner[piece] for piece in pair}
+        if "ball" in owners:
+            part = next(iter(owners - {"ball"}))
+            away[part] = min(away.get(part, np.inf), float(distance))
+    contact = ThingContact("pelvis", 0, 1, "ball", np.array([0.0, -0.1, 0.0]), np.array([0.0, -1.0, 0.0]))
+    touched, point = Touched(figure, Things(scene, {}), [contact]), HeldPoint("pelvis", "", 1, np.zeros(3))
+    gap = touched.gap(contact, point, 0, q, alone=True)
+    trunk = (gap for part, gap in away.items() if re.search("pelvis|thigh|lumbar|thorax", part))
+    assert gap == pytest.approx(min(trunk), abs=0.02)  # m: by which flesh that spreads only on a seat is wider
+    assert gap > away["left_hand"] + 0.03
 
 
 def test_check_moves_the_things_of_a_clip() -> None:

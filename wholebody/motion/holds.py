@@ -8,7 +8,7 @@ with it.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import coal
 import numpy as np
@@ -18,7 +18,9 @@ from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import CLEARANCE
-from wholebody.motion.standing_ground import MOST_FRAMES, Foothold, Ground
+from wholebody.motion.roles import figure_roles
+from wholebody.motion.standing_ground import HANGS, MOST_FRAMES, Foothold, Ground
+from wholebody.motion.surfaces import Surface
 from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
 from wholebody.motion.windows import long_runs, runs
 
@@ -28,7 +30,8 @@ TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyond an edge
-HANGS = 0.15  # m: what seems to rest and has all surfaces so far below it hangs, as legs do of who lies on an edge
+NEXT = "shoulder", "elbow", "knee", "ankle", "toe"  # where another part of a body begins: thighs sit
+BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -40,7 +43,13 @@ class Touched:
 
     def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
         self.things, self.contacts, self._figure = things, contacts, figure
-        self._data = figure.model.createData()
+        self._data, own = figure.model.createData(), figure_roles(figure)
+        ends = [frame for role, frame in own.items() if role.split("_")[-1] in NEXT]
+        self._ends = set[int]()  # joints at which another part of the body begins
+        for at in (figure.model.frames[figure.frame_id(frame)] for frame in ends):
+            far = np.linalg.norm(at.placement.translation) > 1e-6  # the end of what the joint before carries
+            here = at.parentJoint
+            self._ends |= set(np.flatnonzero(np.array(figure.model.parents) == here).tolist()) if far else {here}
 
     def at(self, contact: ThingContact, frame: int) -> pin.SE3:
         """Where a thing is in a frame; what is held in the axes of a part of the body stays in these."""
@@ -56,34 +65,38 @@ class Touched:
             away = contact.away
         return contact.place + (CLEARANCE + away) * contact.normal
 
-    def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array) -> float:
-        """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres."""
+    def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array, alone: bool = False) -> float:
+        """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres.
+
+        `alone`: without further parts of the body, as are the hands of somebody who sits.
+        """
         pin.forwardKinematics(self._figure.model, self._data, q)
-        own = self._part(point.joint, point.place, contact.away)
+        own = self._part(point.joint, point.place, contact.away, alone=alone)
         if not contact.base:
             return least_distance(own, self.things.pieces(contact.thing, frame))
         center = contact.place - contact.away * contact.normal
         other = self._part(contact.base, center, contact.away, most=int(contact.thing.endswith("hand")))
         return least_distance(own, other)
 
-    def _part(self, joint: int, center: Array, radius: float, most: int = 100) -> list[Placed]:
+    def _part(self, joint: int, center: Array, radius: float, most: int = 100, alone: bool = False) -> list[Placed]:
         """What a joint carries; where that is nothing, a ball about a place (3,), and the limb before it."""
-        if carried := self._carried(joint, most):
+        if carried := self._carried(joint, most, alone):
             return carried
         ball = coal.Sphere(max(radius, 1e-6)), self._data.oMi[joint] * pin.SE3(np.eye(3), center)
         bearing = {piece.parentJoint for piece in self._figure.geometry.geometryObjects}
         limb = max(bearing & set(self._figure.model.supports[joint]), default=joint)
         return [ball, *self._carried(limb, 0)]
 
-    def _carried(self, joint: int, most: int = 100) -> list[Placed]:
-        """Pieces on a joint and beyond it, over `most` joints with pieces at most."""
+    def _carried(self, joint: int, most: int = 100, alone: bool = False) -> list[Placed]:
+        """Pieces on a joint and beyond it, over `most` joints with pieces at most; `alone`: to the body's next part."""
         model, geometry = self._figure.model, self._figure.geometry.geometryObjects
         bearing = {piece.parentJoint for piece in geometry}
         return [
             (piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement)
             for piece in geometry
             if joint in (line := list(model.supports[piece.parentJoint]))
-            and len(bearing & set(line[line.index(joint) + 1 :])) <= most
+            and len(bearing & (beyond := set(line[line.index(joint) + 1 :]))) <= most
+            and not (alone and beyond & self._ends)
         ]
 
 
@@ -96,7 +109,7 @@ class Holds:
         ground: Ground,
         scale: float,
         dt: float,
-        surface: Callable[[Array], float | None] | None,
+        surface: Surface | None,
         touched: Touched | None = None,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
@@ -197,13 +210,15 @@ class Holds:
                 if not point.thing or (point.role, point.share, point.base) != key:
                     continue
                 frames = range(contact.first, min(contact.end, len(q)))
-                gaps = np.array([touched.gap(contact, point, frame, q[frame]) for frame in frames])
+                gaps = np.array([touched.gap(contact, point, frame, q[frame], alone=True) for frame in frames])
                 gone = np.array([(number, frame) in self._let_go for frame in frames]) | (gaps > OUT_OF_REACH)
                 if gone.any():
                     spans = [f"{contact.first + run.first} to {contact.first + run.end - 1}" for run in runs(gone)]
+                    far = gaps[gone].max()
+                    how = f"is up to {1e3 * far:.0f} mm away" if far > BY else "touches it at another place"
                     reports.append(
                         f"{contact.role} does not reach {contact.thing} in frames {' and '.join(spans)} "
-                        f"(in the clip it is up to {1e3 * gaps[gone].max():.0f} mm away)"
+                        f"(in the clip it {how})"
                     )
         return "; ".join(reports)
 

@@ -34,9 +34,10 @@ from wholebody.motion.retarget_targets import (
 from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import point_paths
-from wholebody.motion.standing_ground import NOTHING, Ground
+from wholebody.motion.standing_ground import NOTHING, Ground, ground_on
 from wholebody.motion.standing_ground import ground as find_ground
 from wholebody.motion.structure import LIMBS
+from wholebody.motion.surfaces import Surface, surface_of
 from wholebody.motion.thing_contacts import (
     ThingContact,
     Things,
@@ -44,7 +45,6 @@ from wholebody.motion.thing_contacts import (
     own_contacts,
     own_rests,
     still_things,
-    surface_of,
 )
 from wholebody.scene.scene import Scene
 
@@ -68,7 +68,7 @@ def retarget(
         figure: the figure.
         scene: the figure among things, where they were in the recording; None for a level floor. Things do not change
             their size with the figure, so a way among them keeps its length.
-        ground: "auto" to find what the person stands on, as `wb.motion.ground(motion)` does; that, or one that was
+        ground: "auto" to find what the person stands on, as `wb.motion.ground` does in the scene; that, or one that was
             changed; None to hold nothing, and without a scene to follow the skeleton alone.
         things: where things of the scene are that move in the recording: by name, a placement in each frame. The clip
             has them as `things`. Beside others that stand they move as recorded; alone, on a way as much shorter, and
@@ -114,7 +114,8 @@ def retarget(
             'name them by names= (or --names FILE.toml): a table "skeleton" with left_wrist = "hand.L"'
         )
     tracks = _tracks(motion, scene, things)
-    found = checked_ground(motion, figure, ground, names)
+    surface = None if scene is None else surface_of(scene, tracks)
+    found = checked_ground(motion, figure, ground, names, surface)
     # without things but floors, the paths of moving things are scaled like the figure's own path
     still = [] if scene is None else [name for name in still_things(scene) if name not in tracks]
     path = None if scene is None or (tracks and not still) else 1.0
@@ -135,7 +136,6 @@ def retarget(
         q = _postures(alone, frames, progress, 0.0)
         if ground is not None or scene is not None:
             held = NOTHING if ground is None else found
-            surface = None if scene is None else surface_of(scene, tracks)
             recorded, contacts = Things(world, tracks), list[ThingContact]()
             tracks = {name: recorded.scaled(name, proportions.path) for name in tracks}
             joints = skeleton_roles(motion, names)
@@ -269,12 +269,13 @@ def checked_ground(
     figure: Figure,
     given: object,
     names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None,
+    surface: Surface | None,
 ) -> Ground:
-    """The ground of a recording, stated or found."""
+    """The ground of a recording, stated or found, on surfaces of a scene where these are given."""
     if figure.root != "free":  # no ground moves with a pelvis
         return NOTHING
     if given is None or (isinstance(given, str) and given == "auto"):
-        return find_ground(motion, names)
+        return ground_on(motion, names, surface)
     found = instance(given, Ground, "retarget: ground", 'give "auto", wb.motion.ground(motion) or None')
     if any(len(mask) != len(motion) for mask in found.rests.values()) or any(
         not 0 <= each.first < each.end <= len(motion) for each in found.footholds

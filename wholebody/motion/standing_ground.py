@@ -17,12 +17,17 @@ from wholebody.base.files import checked_target
 from wholebody.motion.footholds import SPAN, Point, RestLimits, above_ground, lowest, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.surfaces import Surface, surface_of
 from wholebody.motion.windows import Window, long_runs, runs
+from wholebody.scene.scene import Scene
 
 FEET = ("ankle", "toe")
 OTHERS = ("hand", "wrist", "knee")
 APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
 GATHERED = 0.8  # share of the time of rests at nearly one height that a level has
+HANGS = 0.15  # m: what seems to rest and has all surfaces so far below it hangs, as legs do of who lies on an edge
+UNDER = -0.4, 0.0, 0.5, 1.0, 1.4  # shares of the way from ankle to toe at which a sole is looked at, from its heel on
+ABOVE = -0.05, 0.2  # m: how high an ankle or toe may be recorded above the surface on which its foot stands
 HEIGHT, MOST_FRAMES = Range(-1e6, 1e6, "m"), 10**9
 
 
@@ -92,7 +97,8 @@ class Ground(Checked):
         footholds: in the order of time.
         rests: role to (n,) when it rests.
         lowest: role to the height at which its joint rests on the lowest level, in the recording's world, metres.
-        levels: heights of the floor's levels above the lowest, metres; of uneven ground none beside 0.
+        levels: heights of the floor's levels above the lowest, metres; of uneven ground none beside 0. In a scene those
+            of surfaces, as `height` of footholds.
         tilt: degrees by which the lowest level slopes in the recording; drift of less than 2 degrees is usual.
         uneven: whether heights do not gather in levels; each foothold then has its own.
         dt: seconds from frame to frame.
@@ -171,13 +177,17 @@ NOTHING = Ground((), {}, {}, (0.0,), 0.0, False, 1.0)  # the ground of what neve
 
 
 def ground(
-    motion: SkeletonMotion, names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None
+    motion: SkeletonMotion,
+    names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
+    scene: Scene | None = None,
 ) -> Ground:
     """Find what a recorded person stands on.
 
     Args:
         motion: the skeleton.
         names: as for `wb.retarget`.
+        scene: what stood there in the recording. Then what hangs over an edge does not rest, and heights are those of
+            surfaces, from z = 0 of the scene on.
 
     Returns:
         Without feet that rest, a ground without footholds.
@@ -188,6 +198,19 @@ def ground(
     Examples:
         >>> ground = wb.motion.ground(skeleton)
     """
+    if scene is None:
+        return ground_on(motion, names, None)
+    return ground_on(
+        motion, names, surface_of(checks.instance(scene, Scene, "ground: scene", "make one with wb.Scene(figure)"))
+    )
+
+
+def ground_on(
+    motion: SkeletonMotion,
+    names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None,
+    surface: Surface | None,
+) -> Ground:
+    """The same on surfaces of a scene, or without one."""
     motion = checked_motion(motion, "ground: motion")
     joints = {role: motion.names.index(name) for role, name in skeleton_roles(motion, names).items()}
     feet = [f"{side}_{part}" for side in ("left", "right") for part in FEET if f"{side}_{part}" in joints]
@@ -211,12 +234,74 @@ def ground(
     settled, above = settled - low, {role: height + low for role, height in above.items()}
     holds = [with_values(each, height=float(height)) for each, height in zip(raw, settled, strict=True)]
     tilt = _tilt(np.array([each.place[:2] for each in raw]).reshape(-1, 2), heights, settled)
+    if surface is not None and holds:
+        holds, shift = _on_surfaces(motion, joints, holds, above, surface)
+        above = {role: height + shift for role, height in above.items()}
+        stood = sorted({round(each.height, 3) for each in holds})  # mm
+        levels = (0.0,) if uneven or not stood else tuple(stood)
+        _clear(rests, holds)
     if holds:
         for role in (f"{side}_{part}" for side in ("left", "right") for part in OTHERS):
             if role in joints and not (role.endswith("wrist") and role.replace("wrist", "hand") in joints):
-                mask, more = _others(motion, joints[role], role, holds, above)
-                rests[role], holds = mask, [*holds, *more]
+                rests[role], more = _others(motion, joints[role], role, holds, above)
+                if surface is not None:
+                    more = [each for each in more if not _hangs(each.place, min(above.values()), surface)]
+                    _clear(rests, [*holds, *more])
+                holds = [*holds, *more]
     return Ground(tuple(sorted(holds, key=lambda each: each.first)), rests, above, levels, tilt, uneven, motion.dt)
+
+
+def _clear(rests: dict[str, Mask], holds: list[Foothold]) -> None:
+    """Take from the frames in which roles rest those without a foothold."""
+    for role, mask in rests.items():
+        kept = np.zeros_like(mask)
+        for each in holds:
+            kept[each.first : each.end] |= each.role == role
+        rests[role] = mask & kept
+
+
+def _hangs(place: Array, floor: float, surface: Surface) -> bool:
+    """Whether a place (3,) is far above what is below it; `floor` is z = 0 of the scene in the recording's world."""
+    below = surface(place)
+    return below is not None and place[2] - floor - below > HANGS
+
+
+def _on_surfaces(
+    motion: SkeletonMotion,
+    joints: Mapping[str, int],
+    holds: list[Foothold],
+    above: Mapping[str, float],
+    surface: Surface,
+) -> tuple[list[Foothold], float]:
+    """Footholds of feet with the heights of surfaces, without those that hang; how much they were too high, metres."""
+    known = [_under(motion, joints, each, surface) for each in holds]
+    counts = np.array([each.end - each.first for each in holds])
+    some = [k for k, heights in enumerate(known) if heights]
+    if not some:
+        return holds, 0.0
+    # where they stand, they are as much too high as most are, by errors of the recording
+    off = np.array([min((holds[k].height - height for height in known[k]), key=abs) for k in some])
+    inside = max((np.abs(off - one) <= 0.5 * SPREAD for one in off), key=lambda mask: counts[some][mask].sum())
+    shift = float(np.median(np.repeat(off[inside], counts[some][inside])))
+    if not all(ABOVE[0] <= height + shift <= ABOVE[1] for height in above.values()):
+        shift = 0.0  # the recording's floor is elsewhere
+    found = []
+    for each, heights in zip(holds, known, strict=True):
+        high = each.height - shift
+        here = min(heights, key=lambda height: abs(high - height), default=high)
+        if high - here <= HANGS:
+            found.append(with_values(each, height=here if here - high <= HANGS else high))
+    return found, shift
+
+
+def _under(motion: SkeletonMotion, joints: Mapping[str, int], each: Foothold, surface: Surface) -> list[float]:
+    """Heights of surfaces below the sole of a foot that rests; of those in which it is recorded none."""
+    ends = [f"{each.role.split('_')[0]}_{part}" for part in FEET]
+    ways = [motion.positions[each.first : each.end, joints[role]].mean(axis=0) for role in ends if role in joints]
+    places = [ways[0] + share * (ways[-1] - ways[0]) for share in UNDER] if len(ways) > 1 else ways
+    top = max(place[2] for place in ways)
+    found = [surface(np.array([*place[:2], top])) for place in places]
+    return [height for height in found if height is not None]
 
 
 def _levelled(heights: Array, counts: Indices) -> tuple[Array, tuple[float, ...], bool]:

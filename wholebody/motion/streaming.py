@@ -23,7 +23,7 @@ from wholebody.motion.retargeting import checked_ground, same_figure
 from wholebody.motion.roles import matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.standing_ground import FEET, Ground
-from wholebody.motion.thing_contacts import surface_of
+from wholebody.motion.surfaces import surface_of
 from wholebody.scene.scene import Scene
 
 
@@ -74,7 +74,8 @@ class Retargeter:
         if scene is not None:
             same_figure(instance(scene, Scene, "Retargeter: scene", "make one with wb.Scene(figure)"), figure)
         self._like, self._roles = motion, matched(motion, figure, names)
-        known = checked_ground(motion, figure, ground, names)
+        surface = None if scene is None else surface_of(scene)
+        known = checked_ground(motion, figure, ground, names, surface)
         self._proportions = Proportions(motion, figure, self._roles, known, None if scene is None else 1.0)
         like = self._proportions.targets(motion)
         if not like.points:
@@ -88,7 +89,6 @@ class Retargeter:
         self._rests: LiveRests | None = None
         if ground is None:
             known = replace(known, footholds=(), rests={role: known.rests[role] for role in self._feet})
-        surface = None if scene is None else surface_of(scene, ())
         points = held_points(figure, self._roles, known)
         self._holds = Holds(points, known, self._proportions.path, motion.dt, surface)
         self._run = Run(figure, like, self._roles, motion.dt, self._holds, world.workspace())

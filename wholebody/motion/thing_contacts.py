@@ -11,7 +11,7 @@ a hand that rests does not hold the body.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import coal
@@ -189,37 +189,6 @@ def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) 
                 last = max(last, far - gap)
             far += max(abs(gap), 1e-3)
     return last
-
-
-def surface_of(scene: Scene, moving: Collection[str]) -> Callable[[Array], float | None]:
-    """Height [m] of the first still surface up to 2 m below a place (3,); None for none, or in a thing."""
-    owners, geometry = scene.piece_owner, scene.geometry
-    still = [
-        (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
-        for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
-        if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
-    ]
-    ball, request = coal.Sphere(1e-6), coal.DistanceRequest()
-
-    def height(place: Array) -> float | None:
-        found = list[float]()
-        for shape, where in still:
-            at = np.array(place)
-            while at[2] > place[2] - 2.0:
-                result = coal.DistanceResult()
-                gap = float(coal.distance(ball, coal.Transform3s(np.eye(3), at), shape, where, request, result))
-                if gap < 1e-5 and at[2] == place[2]:
-                    return None
-                if gap < 1e-5:
-                    found.append(float(at[2]))
-                    break
-                down = -float(result.normal[2])  # a convex piece is beyond the plane through its nearest point
-                if not down > 1e-6:
-                    break
-                at[2] -= max(gap / down, 1e-6)
-        return max(found, default=None)
-
-    return height
 
 
 BODY = {
