@@ -106,16 +106,12 @@ class Gap(NamedTuple):
         if near.distance > PLANES_WITHIN:
             return no_planes(state.model.nv)
         edges = crossed_edges(self.first, self.second, near, state)
-        found = [*faces_met(self.first, self.second, near.pieces, state, edges)]
+        ahead = faces_met(self.first, self.second, near.pieces, state, edges)
         back = faces_met(self.second, self.first, near.pieces[::-1], state)
-        joints = [(near.against, near.joint)] * len(found)
-        found += [with_values(plane, key=plane.key + MOST_FACES) for plane in back]
-        joints += [(near.joint, near.against)] * (len(found) - len(joints))
-        wrench = np.vstack([np.zeros((0, 6)), *(through(plane.point, plane.normal[None]) for plane in found)])
-        of, against = np.array(joints, dtype=np.intp).reshape(-1, 2).T
-        value = np.array([plane.value for plane in found])
-        rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
-        key = np.array([plane.key for plane in found], dtype=np.intp)
+        value, normals, points = (np.concatenate(part) for part in zip(ahead[:3], back[:3], strict=True))
+        key, counts = np.concatenate([ahead.key, back.key + MOST_FACES]), (len(ahead.key), len(back.key))
+        of, against = np.repeat([(near.against, near.joint), (near.joint, near.against)], counts, axis=0).T
+        rows = state.rows(through_each(points, normals), of, against)
         if self.own is None or self.own.flat:
             turned = through(near.point, bends(self.first, self.second, near, state))
         else:
@@ -233,6 +229,14 @@ class Over(NamedTuple):
 def through(point: Array, forces: Array) -> Array:
     """Wrenches (k, 6) of forces (k, 3) through a point (3,)."""
     return np.concatenate((forces, forces @ pin.skew(point).T), axis=1)
+
+
+def through_each(points: Array, forces: Array) -> Array:
+    """Wrenches (k, 6) of forces (k, 3), each through a point of its own (k, 3)."""
+    (x, y, z), crossed = points.T, np.zeros((len(points), 3, 3))
+    crossed[:, 0, 1], crossed[:, 0, 2], crossed[:, 1, 2] = -z, y, -x
+    crossed[:, 1, 0], crossed[:, 2, 0], crossed[:, 2, 1] = z, -y, x
+    return np.concatenate((forces, (forces[:, None] @ crossed.transpose(0, 2, 1))[:, 0]), axis=1)
 
 
 def between(state: State, wrench: Array, joint: int, against: int) -> Array:

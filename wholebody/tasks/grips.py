@@ -23,7 +23,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
 from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Surface, between_pieces, nearest, outermost
+from wholebody.tasks.surfaces import Face, Pair, Surface, nearest, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
@@ -271,11 +271,8 @@ def _rounded(shape: Any) -> Any:
 def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:
     """Derivative (6, 3) of the normal of two pieces by the twist of the first at the world's origin, by differences."""
     i, j = pieces
-    place, other = surface.placed(i, state), thing.placed(j, state)
-    found = np.empty((6, 3))
-    for axis, (ahead, behind) in enumerate(zip(AHEAD, BEHIND, strict=True)):
-        ends = [
-            between_pieces(surface.shapes[i], moved * place, thing.shapes[j], other).normal for moved in (ahead, behind)
-        ]
-        found[axis] = (np.array(ends[0]) - np.array(ends[1])) / (2.0 * STEP)
-    return found
+    place, pair = surface.placed(i, state), Pair(surface.shapes[i], thing.shapes[j])
+    other, normals = coal.Transform3s(thing.placed(j, state)), np.empty((12, 3))
+    for row, moved in enumerate((*AHEAD, *BEHIND)):
+        normals[row] = pair.at(coal.Transform3s(moved * place), other).normal
+    return np.asarray((normals[:6] - normals[6:]) / (2.0 * STEP))

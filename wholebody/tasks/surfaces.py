@@ -227,6 +227,19 @@ def between_pieces(first: Any, placed: pin.SE3, second: Any, other: pin.SE3) -> 
     return result
 
 
+class Pair:
+    """Two shapes whose distance is asked at several placements."""
+
+    def __init__(self, first: Any, second: Any) -> None:
+        self._distance, self._result = coal.ComputeDistance(first, second), coal.DistanceResult()
+
+    def at(self, first: Any, second: Any) -> Any:
+        """Coal's result, which the next call overwrites, with both at coal's transforms."""
+        self._result.clear()
+        self._distance(first, second, _REQUEST, self._result)
+        return self._result
+
+
 def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
     """The point (3,) of a piece that is nearest to a point (3,) outside of it."""
     place = pin.SE3(np.eye(3), point)
