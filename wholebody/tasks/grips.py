@@ -23,7 +23,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
 from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Pair, Surface, nearest, outermost
+from wholebody.tasks.surfaces import Face, Nearest, Pair, Surface, nearest, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
@@ -240,7 +240,7 @@ class Opposing(NamedTuple):
         row = fall * beyond * Gap(surfaces[farthest], thing).rows(state)[1]
         for number, (surface, near) in enumerate(zip(surfaces, nears, strict=True)):
             force = share * (toward if number == 0 else other / length)
-            wrench = _by_twist(surface, self.smooth, state, near.pieces) @ force
+            wrench = _by_twist(surface, self.smooth, near, state) @ force
             row += between(state, wrench[None], near.against, near.joint)
         return np.array([self.lever * share * beyond]), self.lever * row
 
@@ -268,11 +268,15 @@ def _rounded(shape: Any) -> Any:
     return coal_convex(hull.points[used], triangles.reshape(-1, 3))
 
 
-def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:
+def _by_twist(surface: Surface, thing: Surface, near: Nearest, state: State) -> Array:
     """Derivative (6, 3) of the normal of two pieces by the twist of the first at the world's origin, by differences."""
-    i, j = pieces
-    place, pair = surface.placed(i, state), Pair(surface.shapes[i], thing.shapes[j])
-    other, normals = coal.Transform3s(thing.placed(j, state)), np.empty((12, 3))
-    for row, moved in enumerate((*AHEAD, *BEHIND)):
-        normals[row] = pair.at(coal.Transform3s(moved * place), other).normal
-    return np.asarray((normals[:6] - normals[6:]) / (2.0 * STEP))
+    key = "twist", id(surface.shapes), id(thing.shapes)
+    kept = state.kept.get(key)
+    if kept is None or kept[0] is not near:  # rows and planes of one posture share it
+        i, j = near.pieces
+        place, pair = surface.placed(i, state), Pair(surface.shapes[i], thing.shapes[j])
+        other, normals = coal.Transform3s(thing.placed(j, state)), np.empty((12, 3))
+        for row, moved in enumerate((*AHEAD, *BEHIND)):
+            normals[row] = pair.at(coal.Transform3s(moved * place), other).normal
+        kept = state.kept[key] = near, (normals[:6] - normals[6:]) / (2.0 * STEP)
+    return np.asarray(kept[1])
