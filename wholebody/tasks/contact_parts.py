@@ -68,7 +68,7 @@ class OwnSurface(NamedTuple):
 
     def bends(self, other: Surface, state: State) -> Array:
         """Wrenches (b, 6) of how the distance of the piece bends: see `kinks.bends`."""
-        turned = bends(self.middle, other, nearest(self.middle, other, state), state, self.radius)
+        turned = bends(self.middle, other, nearest(self.middle, other, state), self.radius)
         return through(self.middle.placed(0, state).translation, turned)
 
     def rows(self, point: Surface, other: Surface, near: Nearest, state: State) -> tuple[Array, Array]:
@@ -105,18 +105,18 @@ class Gap(NamedTuple):
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
             return no_planes(state.model.nv)
-        edges = crossed_edges(self.first, self.second, near, state)
-        ahead = faces_met(self.first, self.second, near.pieces, state, edges)
-        back = faces_met(self.second, self.first, near.pieces[::-1], state)
+        edges = crossed_edges(self.first, self.second, near)
+        ahead = faces_met(self.first, self.second, near.pieces, near.where, edges)
+        back = faces_met(self.second, self.first, near.pieces[::-1], near.where[::-1])
         value, normals, points = (np.concatenate(part) for part in zip(ahead[:3], back[:3], strict=True))
         key, counts = np.concatenate([ahead.key, back.key + MOST_FACES]), (len(ahead.key), len(back.key))
-        of, against = np.repeat([(near.against, near.joint), (near.joint, near.against)], counts, axis=0).T
+        of, against = np.array([near.against, near.joint]).repeat(counts), np.array([near.joint, near.against]).repeat(counts)
         rows = state.rows(through_each(points, normals), of, against)
         if self.own is None or self.own.flat:
-            turned = through(near.point, bends(self.first, self.second, near, state))
+            turned = through(near.point, bends(self.first, self.second, near))
         else:
             turned = self.own.bends(self.second, state)
-        bend = between(state, turned, near.joint, near.against)
+        bend = between(state, turned, near.joint, near.against) if len(turned) else rows[:0]
         if self.own is not None:
             upright, turns = self.own.rows(self.first, self.second, near, state)
             sides = 2.0 * np.pi * np.arange(8) / 8  # of the octagon within the circle of the room
@@ -276,13 +276,15 @@ class TermOfParts(Constraint):
 
     def supporting_planes(self, state: State) -> SupportingPlanes:
         """Planes of the faces about every gap: past an edge there is no surface left to slide on."""
-        found, row = [no_planes(state.model.nv)], 0
+        found, row = list[SupportingPlanes](), 0
         for number, part in enumerate(self.parts):
             if hasattr(part, "planes"):  # what says where its rows have kinks; keys are less than 3 `MOST_FACES`
-                planes: SupportingPlanes = part.planes(state)
-                key, bend_row = planes.key + 3 * MOST_FACES * number, planes.bend_row + row
-                found.append(with_values(planes, key=key, bend_row=bend_row))
+                value, rows, key, bend, bend_row = part.planes(state)
+                if len(value) or len(bend):
+                    found.append(SupportingPlanes(value, rows, key + 3 * MOST_FACES * number, bend, bend_row + row))
             row += len(part.in_radians)
+        if not found:
+            return no_planes(state.model.nv)
         return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 

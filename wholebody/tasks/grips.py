@@ -274,8 +274,8 @@ def _by_twist(surface: Surface, thing: Surface, near: Nearest, state: State) -> 
     kept = state.kept.get(key)
     if kept is None or kept[0] is not near:  # rows and planes of one posture share it
         i, j = near.pieces
-        place, pair = surface.placed(i, state), Pair(surface.shapes[i], thing.shapes[j])
-        other, normals = coal.Transform3s(thing.placed(j, state)), np.empty((12, 3))
+        (place, still), pair = near.places, Pair(surface.shapes[i], thing.shapes[j])
+        other, normals = coal.Transform3s(still), np.empty((12, 3))
         for row, moved in enumerate((*AHEAD, *BEHIND)):
             normals[row] = pair.at(coal.Transform3s(moved * place), other).normal
         kept = state.kept[key] = near, (normals[:6] - normals[6:]) / (2.0 * STEP)

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.figures.state import State
 from wholebody.tasks.axis import across
 from wholebody.tasks.surfaces import ACCURACY, Nearest, Pair, Surface, Where, between_pieces, outermost
 
@@ -35,14 +34,14 @@ NO_FACES = FacePlanes(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(
 
 
 def faces_met(
-    first: Surface, second: Surface, pieces: tuple[int, int], state: State, edges: Array = NO_EDGES
+    first: Surface, second: Surface, pieces: tuple[int, int], places: tuple[Where, Where], edges: Array = NO_EDGES
 ) -> FacePlanes:
     """The faces of the second surface's nearest piece, as the first's meets them; inner ones are left out."""
     i, j = pieces
     swept = second.swept[j]
     if swept.radius or len(swept.faces) < 2 or not isfinite(first.reach[i]):
         return NO_FACES
-    where, ours = second.where(state), first.placed(i, state)
+    where, ours = places[1], places[0].places[i]
     turn, origin = where.places[j].rotation.T, where.origins[j]
     normals = swept.faces[:, :3] @ turn
     offsets = swept.faces[:, 3] + normals @ origin
@@ -76,19 +75,19 @@ def _inner(shape: Any, placed: pin.SE3, second: Surface, piece: int, where: Wher
     return np.asarray(beyond.any(axis=1))
 
 
-def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+def crossed_edges(first: Surface, second: Surface, near: Nearest) -> Array:
     """Normals, from the second surface, and points (k, 2, 3) of edges that cross where sharp pieces slide."""
     # The least depth of crossing edges is along the normal of both, which no face has; round pieces have none.
     i, j = near.pieces
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
     if not sharp or abs(near.distance) > STEP:
         return NO_EDGES
-    crossed = _slid(first, second, near, state, across(near.normal)[:2], EDGE).reshape(4, 2, 3)
+    crossed = _slid(first, second, near, across(near.normal)[:2], EDGE).reshape(4, 2, 3)
     crossed[:, 0] *= -1.0
     return np.asarray(crossed[np.linalg.norm(crossed[:, 0], axis=1) > 0.5])
 
 
-def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: float = 0.0) -> Array:
+def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -> Array:
     """Directions (b, 3), each times the root of the distance's second derivative when round pieces slide along it."""
     i, j = near.pieces
     round_by = max(_roundness(first, i), radius) + _roundness(second, j)
@@ -97,18 +96,18 @@ def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: 
     along = across(near.normal)[:2]
     # share of the radius, by which pieces are moved along each other to see how their normal turns
     step = 1e-2 * round_by
-    normals = _slid(first, second, near, state, along, step)[:, :, 0]
+    normals = _slid(first, second, near, along, step)[:, :, 0]
     turned = np.array([along @ change / (2.0 * step) for change in normals[:, 1] - normals[:, 0]])
     values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
     values = np.where(np.isfinite(values), np.clip(values, 0.0, 2.0 / round_by), 0.0)
     return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
 
 
-def _slid(first: Surface, second: Surface, near: Nearest, state: State, along: Array, step: float) -> Array:
+def _slid(first: Surface, second: Surface, near: Nearest, along: Array, step: float) -> Array:
     """Normals and points of the first of the nearest pieces, (2, 2, 2, 3): the second slid back and on, along two ways."""
     i, j = near.pieces
-    place, pair = second.placed(j, state), Pair(first.shapes[i], second.shapes[j])
-    ours, theirs, found = coal.Transform3s(first.placed(i, state)), coal.Transform3s(place), np.empty((2, 2, 2, 3))
+    (at, place), pair = near.places, Pair(first.shapes[i], second.shapes[j])
+    ours, theirs, found = coal.Transform3s(at), coal.Transform3s(place), np.empty((2, 2, 2, 3))
     for row, ends in enumerate(place.translation + step * np.array([-along, along])):
         for way, end in enumerate(ends):
             theirs.setTranslation(end)

@@ -102,6 +102,13 @@ class Nearest(NamedTuple):
     joint: int  # joint that carries the piece of the second surface
     against: int  # joint that carries the piece of the first
     pieces: tuple[int, int]  # number of the piece of the first surface, and of the second
+    where: tuple[Where, Where]  # all pieces of the first surface, and of the second
+
+    @property
+    def places(self) -> tuple[pin.SE3, pin.SE3]:
+        """Where the two pieces are in the world."""
+        (i, j), (one, other) = self.pieces, self.where
+        return one.places[i], other.places[j]
 
 
 def surface(scene: Scene, name: str, where: str) -> Surface:
@@ -212,7 +219,7 @@ def _nearest(first: Surface, second: Surface, one: Where, other: Where) -> Neare
         length = float(np.linalg.norm(apart))
         normal = apart / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
     middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
-    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
+    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j), (one, other))
 
 
 def _pairs(first: Surface, ours: Array, second: Surface, theirs: Array) -> Iterable[tuple[float, int, int]]:
