@@ -300,7 +300,7 @@ class ContactTerm(TermOfParts, Goal):
 
 def beyond(value: Array, jacobian: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """What of values (k,) is out of their ranges, and the derivative (k, nv), which is zero within."""
-    excess = value - np.clip(value, low, high)
+    excess = value - np.minimum(np.maximum(value, low), high)  # np.clip takes four times as long
     return excess, np.where(((excess != 0.0) | (low == high))[:, None], jacobian, 0.0)
 
 

@@ -177,7 +177,7 @@ class Looking(NamedTuple):
     def _signed(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, negative within, and its derivative (1, nv)."""
         axis = state.frame(self.place.frame).rotation[:, 2]
-        cosine = float(np.clip(axis @ self.direction, -1.0, 1.0))
+        cosine = min(max(float(axis @ self.direction), -1.0), 1.0)
         angle = abs(float(np.arcsin(cosine))) if self.level else float(np.arccos(cosine))
         slope = (1.0 if cosine > 0.0 else -1.0) if self.level else -1.0
         moment = pin.skew(axis) @ self.direction
@@ -217,7 +217,7 @@ class Opposing(NamedTuple):
         """The angle beyond, negative within, and its derivative (1, nv); None where it is not more than `least`."""
         surfaces, thing = (self.first, *self.others), self.thing
         distances = [nearest(surface, thing, state).distance for surface in surfaces]
-        farthest = int(np.argmax(distances))
+        farthest = distances.index(max(distances))
         left = 1.0 - max(distances[farthest], 0.0) / self.far
         if left <= 0.0:
             return None
@@ -228,7 +228,7 @@ class Opposing(NamedTuple):
         total = normals[1:].sum(axis=0)
         length = max(float(np.linalg.norm(total)), SHORTEST)
         mean = total / length
-        cosine = float(np.clip(-normals[0] @ mean, -1.0, 1.0))
+        cosine = min(max(float(-normals[0] @ mean), -1.0), 1.0)
         beyond = float(np.arccos(cosine)) - self.most
         if beyond <= least:
             return None

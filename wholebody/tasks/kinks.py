@@ -97,9 +97,9 @@ def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -
     # share of the radius, by which pieces are moved along each other to see how their normal turns
     step = 1e-2 * round_by
     normals = _slid(first, second, near, along, step)[:, :, 0]
-    turned = np.array([along @ change / (2.0 * step) for change in normals[:, 1] - normals[:, 0]])
+    turned = (along @ (normals[:, 1] - normals[:, 0])[:, :, None])[:, :, 0] / (2.0 * step)
     values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
-    values = np.where(np.isfinite(values), np.clip(values, 0.0, 2.0 / round_by), 0.0)
+    values = np.where(np.isfinite(values), np.minimum(np.maximum(values, 0.0), 2.0 / round_by), 0.0)
     return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
 
 
@@ -130,7 +130,8 @@ def _behind(surface: Surface, number: int, placement: pin.SE3, normals: Array) -
     if len(swept.points) == 0:
         return np.vstack([outermost(surface.shapes[number], placement, -normal, swept) for normal in normals])
     placed = swept.points @ placement.rotation.T + placement.translation
-    return np.asarray(placed[np.argmin(normals @ placed.T, axis=1)] - swept.radius * normals)
+    behind: Array = placed[(normals @ placed.T).argmin(axis=1)]
+    return behind - swept.radius * normals if swept.radius else behind
 
 
 def _heights(surface: Surface, pieces: Sequence[int], places: Sequence[pin.SE3], ways: Array) -> Array:
