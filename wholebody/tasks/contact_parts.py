@@ -110,7 +110,7 @@ class Gap(NamedTuple):
         back = faces_met(self.second, self.first, near.pieces[::-1], near.where[::-1])
         value, normals, points = (np.concatenate(part) for part in zip(ahead[:3], back[:3], strict=True))
         key, counts = np.concatenate([ahead.key, back.key + MOST_FACES]), (len(ahead.key), len(back.key))
-        of, against = np.array([near.against, near.joint]).repeat(counts), np.array([near.joint, near.against]).repeat(counts)
+        of, against = np.array([(near.against, near.joint), (near.joint, near.against)]).repeat(counts, axis=1)
         rows = state.rows(through_each(points, normals), of, against)
         if self.own is None or self.own.flat:
             turned = through(near.point, bends(self.first, self.second, near))

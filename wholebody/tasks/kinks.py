@@ -104,7 +104,7 @@ def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -
 
 
 def _slid(first: Surface, second: Surface, near: Nearest, along: Array, step: float) -> Array:
-    """Normals and points of the first of the nearest pieces, (2, 2, 2, 3): the second slid back and on, along two ways."""
+    """Normals and points on the first piece (2, 2, 2, 3), with the second slid back and on along two ways (2, 3)."""
     i, j = near.pieces
     (at, place), pair = near.places, Pair(first.shapes[i], second.shapes[j])
     ours, theirs, found = coal.Transform3s(at), coal.Transform3s(place), np.empty((2, 2, 2, 3))
