@@ -23,7 +23,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
 from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Nearest, Pair, Surface, nearest, outermost
+from wholebody.tasks.surfaces import Face, Nearest, Surface, between_transforms, nearest, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
@@ -274,9 +274,10 @@ def _by_twist(surface: Surface, thing: Surface, near: Nearest, state: State) -> 
     kept = state.kept.get(key)
     if kept is None or kept[0] is not near:  # rows and planes of one posture share it
         i, j = near.pieces
-        (place, still), pair = near.places, Pair(surface.shapes[i], thing.shapes[j])
-        other, normals = coal.Transform3s(still), np.empty((12, 3))
+        (place, still), normals = near.places, np.empty((12, 3))
+        other = coal.Transform3s(still)
         for row, moved in enumerate((*AHEAD, *BEHIND)):
-            normals[row] = pair.at(coal.Transform3s(moved * place), other).normal
+            at = coal.Transform3s(moved * place)
+            normals[row] = between_transforms(surface.shapes[i], at, thing.shapes[j], other).normal
         kept = state.kept[key] = near, (normals[:6] - normals[6:]) / (2.0 * STEP)
     return np.asarray(kept[1])

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.tasks.axis import across
-from wholebody.tasks.surfaces import ACCURACY, Nearest, Pair, Surface, Where, between_pieces, outermost
+from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, Where, between_pieces, between_transforms, outermost
 
 MOST_FACES = 256  # more than a piece ever has
 STEP = 2e-3  # m: nor do those that are farther than this from what touches; surfaces farther apart are at no edge
@@ -106,12 +106,12 @@ def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -
 def _slid(first: Surface, second: Surface, near: Nearest, along: Array, step: float) -> Array:
     """Normals and points on the first piece (2, 2, 2, 3), with the second slid back and on along two ways (2, 3)."""
     i, j = near.pieces
-    (at, place), pair = near.places, Pair(first.shapes[i], second.shapes[j])
+    at, place = near.places
     ours, theirs, found = coal.Transform3s(at), coal.Transform3s(place), np.empty((2, 2, 2, 3))
     for row, ends in enumerate(place.translation + step * np.array([-along, along])):
         for way, end in enumerate(ends):
             theirs.setTranslation(end)
-            met = pair.at(ours, theirs)
+            met = between_transforms(first.shapes[i], ours, second.shapes[j], theirs)
             found[way, row, 0], found[way, row, 1] = met.normal, met.getNearestPoint1()
     return found
 

@@ -235,22 +235,16 @@ def _pairs(first: Surface, ours: Array, second: Surface, theirs: Array) -> Itera
 
 def between_pieces(first: Any, placed: pin.SE3, second: Any, other: pin.SE3) -> Any:
     """Coal's distance of two shapes at their placements."""
+    return between_transforms(first, coal.Transform3s(placed), second, coal.Transform3s(other))
+
+
+def between_transforms(first: Any, placed: Any, second: Any, other: Any) -> Any:
+    """The same at coal's transforms, of which one may be kept while the other moves."""
+    # A functor of coal's that is kept too takes less, but remembers where a hull was last: other digits, and of an
+    # ellipsoid now and then no answer.
     result = coal.DistanceResult()
-    coal.distance(first, coal.Transform3s(placed), second, coal.Transform3s(other), _REQUEST, result)
+    coal.distance(first, placed, second, other, _REQUEST, result)
     return result
-
-
-class Pair:
-    """Two shapes whose distance is asked at several placements."""
-
-    def __init__(self, first: Any, second: Any) -> None:
-        self._distance, self._result = coal.ComputeDistance(first, second), coal.DistanceResult()
-
-    def at(self, first: Any, second: Any) -> Any:
-        """Coal's result, which the next call overwrites, with both at coal's transforms."""
-        self._result.clear()
-        self._distance(first, second, _REQUEST, self._result)
-        return self._result
 
 
 def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
