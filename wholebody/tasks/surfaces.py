@@ -240,8 +240,7 @@ def between_pieces(first: Any, placed: pin.SE3, second: Any, other: pin.SE3) -> 
 
 def between_transforms(first: Any, placed: Any, second: Any, other: Any) -> Any:
     """The same at coal's transforms, of which one may be kept while the other moves."""
-    # A functor of coal's that is kept too takes less, but remembers where a hull was last: other digits, and of an
-    # ellipsoid now and then no answer.
+    # One of coal's functors, kept for several calls, remembers where a hull was last: its digits differ.
     result = coal.DistanceResult()
     coal.distance(first, placed, second, other, _REQUEST, result)
     return result
