@@ -23,7 +23,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
 from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Surface, between_pieces, nearest, outermost
+from wholebody.tasks.surfaces import Face, Nearest, Surface, between_transforms, nearest, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
@@ -177,7 +177,7 @@ class Looking(NamedTuple):
     def _signed(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, negative within, and its derivative (1, nv)."""
         axis = state.frame(self.place.frame).rotation[:, 2]
-        cosine = float(np.clip(axis @ self.direction, -1.0, 1.0))
+        cosine = min(max(float(axis @ self.direction), -1.0), 1.0)
         angle = abs(float(np.arcsin(cosine))) if self.level else float(np.arccos(cosine))
         slope = (1.0 if cosine > 0.0 else -1.0) if self.level else -1.0
         moment = pin.skew(axis) @ self.direction
@@ -217,7 +217,7 @@ class Opposing(NamedTuple):
         """The angle beyond, negative within, and its derivative (1, nv); None where it is not more than `least`."""
         surfaces, thing = (self.first, *self.others), self.thing
         distances = [nearest(surface, thing, state).distance for surface in surfaces]
-        farthest = int(np.argmax(distances))
+        farthest = distances.index(max(distances))
         left = 1.0 - max(distances[farthest], 0.0) / self.far
         if left <= 0.0:
             return None
@@ -228,7 +228,7 @@ class Opposing(NamedTuple):
         total = normals[1:].sum(axis=0)
         length = max(float(np.linalg.norm(total)), SHORTEST)
         mean = total / length
-        cosine = float(np.clip(-normals[0] @ mean, -1.0, 1.0))
+        cosine = min(max(float(-normals[0] @ mean), -1.0), 1.0)
         beyond = float(np.arccos(cosine)) - self.most
         if beyond <= least:
             return None
@@ -240,7 +240,7 @@ class Opposing(NamedTuple):
         row = fall * beyond * Gap(surfaces[farthest], thing).rows(state)[1]
         for number, (surface, near) in enumerate(zip(surfaces, nears, strict=True)):
             force = share * (toward if number == 0 else other / length)
-            wrench = _by_twist(surface, self.smooth, state, near.pieces) @ force
+            wrench = _by_twist(surface, self.smooth, near, state) @ force
             row += between(state, wrench[None], near.against, near.joint)
         return np.array([self.lever * share * beyond]), self.lever * row
 
@@ -268,14 +268,16 @@ def _rounded(shape: Any) -> Any:
     return coal_convex(hull.points[used], triangles.reshape(-1, 3))
 
 
-def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:
+def _by_twist(surface: Surface, thing: Surface, near: Nearest, state: State) -> Array:
     """Derivative (6, 3) of the normal of two pieces by the twist of the first at the world's origin, by differences."""
-    i, j = pieces
-    place, other = surface.placed(i, state), thing.placed(j, state)
-    found = np.empty((6, 3))
-    for axis, (ahead, behind) in enumerate(zip(AHEAD, BEHIND, strict=True)):
-        ends = [
-            between_pieces(surface.shapes[i], moved * place, thing.shapes[j], other).normal for moved in (ahead, behind)
-        ]
-        found[axis] = (np.array(ends[0]) - np.array(ends[1])) / (2.0 * STEP)
-    return found
+    key = "twist", id(surface.shapes), id(thing.shapes)
+    kept = state.kept.get(key)
+    if kept is None or kept[0] is not near:  # rows and planes of one posture share it
+        i, j = near.pieces
+        (place, still), normals = near.places, np.empty((12, 3))
+        other = coal.Transform3s(still)
+        for row, moved in enumerate((*AHEAD, *BEHIND)):
+            at = coal.Transform3s(moved * place)
+            normals[row] = between_transforms(surface.shapes[i], at, thing.shapes[j], other).normal
+        kept = state.kept[key] = near, (normals[:6] - normals[6:]) / (2.0 * STEP)
+    return np.asarray(kept[1])

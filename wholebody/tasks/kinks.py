@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from math import isfinite
+from typing import Any, NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
-from wholebody.figures.state import State
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.tasks.axis import across
-from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, between_pieces, outermost
+from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, Where, between_pieces, between_transforms, outermost
 
 MOST_FACES = 256  # more than a piece ever has
 STEP = 2e-3  # m: nor do those that are farther than this from what touches; surfaces farther apart are at no edge
@@ -20,82 +21,99 @@ EDGE = 1e-3  # m: by which pieces are moved along each other to find the normals
 NO_EDGES: Array = np.zeros((0, 2, 3))
 
 
-class FacePlane(NamedTuple):
-    """The plane of a face of one piece, and the point of another piece that is farthest behind it."""
+class FacePlanes(NamedTuple):
+    """Planes of faces of one piece, and the points of another piece that are farthest behind them."""
 
-    value: float  # how far in front of the plane that point is [m]; not positive where the pieces touch
-    normal: Array  # (3,) outward
-    point: Array  # (3,) [m]
-    key: int  # number of the face
+    value: Array  # (k,) how far in front of its plane a point is [m]; not positive where the pieces touch
+    normal: Array  # (k, 3) outward
+    point: Array  # (k, 3) [m]
+    key: Indices  # (k,) number of the face
+
+
+NO_FACES = FacePlanes(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp))
 
 
 def faces_met(
-    first: Surface, second: Surface, pieces: tuple[int, int], state: State, edges: Array = NO_EDGES
-) -> list[FacePlane]:
+    first: Surface, second: Surface, pieces: tuple[int, int], places: tuple[Where, Where], edges: Array = NO_EDGES
+) -> FacePlanes:
     """The faces of the second surface's nearest piece, as the first's meets them; inner ones are left out."""
     i, j = pieces
     swept = second.swept[j]
-    if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
-        return []
-    ours, theirs = first.placed(i, state), second.placed(j, state)
-    normals = np.vstack([swept.faces[:, :3] @ theirs.rotation.T, edges[:, 0]])
-    corners = swept.points @ theirs.rotation.T + theirs.translation
-    faces = swept.faces[:, 3] + normals[: len(swept.faces)] @ theirs.translation
-    offsets = np.append(faces, (corners @ edges[:, 0].T).max(axis=0))
-    points = np.vstack([_behind(first, i, ours, normals[: len(faces)]), edges[:, 1]])
+    if swept.radius or len(swept.faces) < 2 or not isfinite(first.reach[i]):
+        return NO_FACES
+    where, ours = places[1], places[0].places[i]
+    turn, origin = where.places[j].rotation.T, where.origins[j]
+    normals = swept.faces[:, :3] @ turn
+    offsets = swept.faces[:, 3] + normals @ origin
+    points = _behind(first, i, ours, normals)
+    if len(edges):
+        corners = swept.points @ turn + origin
+        offsets = np.append(offsets, (corners @ edges[:, 0].T).max(axis=0))
+        normals, points = np.vstack([normals, edges[:, 0]]), np.vstack([points, edges[:, 1]])
     values = np.einsum("ij,ij->i", normals, points) - offsets
-    # most faces of a piece that are looked at, those first that are nearest or passed
-    keys, where = np.argsort(-values)[:8], second.where(state)
-    apart = where.origins - points[keys, None]
+    keys = np.argsort(-values)[:8]  # most faces of a piece that are looked at, those first that are nearest or passed
+    if len(second.shapes) > 1:
+        keys = keys[~_inner(first.shapes[i], ours, second, j, where, (normals[keys], points[keys], offsets[keys]))]
+    return FacePlanes(values[keys], normals[keys], points[keys], keys)
+
+
+def _inner(shape: Any, placed: pin.SE3, second: Surface, piece: int, where: Where, faces: tuple[Array, ...]) -> Mask:
+    """(k,) which faces of a piece others of its surface continue, where a shape meets them."""
+    normals, points, offsets = faces
+    apart = where.origins - points[:, None]
     # m: pieces of one thing that are farther away do not continue its surface
     near = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) < np.add(second.reach, 0.05)
-    near[:, j] = False
+    near[:, piece] = False
     others = np.flatnonzero(near.any(axis=0)).tolist()
-    beyond = near[:, others] & (_heights(second, others, where.places, normals[keys]) > offsets[keys, None] + ACCURACY)
-    for n, other in enumerate(others):  # it continues the surface if it is also where the first piece touches
+    if not others:
+        return np.zeros(len(normals), dtype=bool)
+    beyond = near[:, others] & (_heights(second, others, where.places, normals) > offsets[:, None] + ACCURACY)
+    for n, other in enumerate(others):  # it continues the surface if it is also where the shape touches
         if beyond[:, n].any():
-            met = between_pieces(first.shapes[i], ours, second.shapes[other], where.places[other])
+            met = between_pieces(shape, placed, second.shapes[other], where.places[other])
             beyond[:, n] &= met.min_distance <= STEP
-    ends = keys[~beyond.any(axis=1)].tolist()
-    return [FacePlane(float(values[key]), normals[key], points[key], key) for key in ends]
+    return np.asarray(beyond.any(axis=1))
 
 
-def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+def crossed_edges(first: Surface, second: Surface, near: Nearest) -> Array:
     """Normals, from the second surface, and points (k, 2, 3) of edges that cross where sharp pieces slide."""
     # The least depth of crossing edges is along the normal of both, which no face has; round pieces have none.
     i, j = near.pieces
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
     if not sharp or abs(near.distance) > STEP:
         return NO_EDGES
-    a, b, found = first.placed(i, state), second.placed(j, state), []
-    for way in across(near.normal)[:2]:
-        for step in (-EDGE, EDGE):
-            slid = pin.SE3(b.rotation, b.translation + step * way)
-            met = between_pieces(first.shapes[i], a, second.shapes[j], slid)
-            found.append((-np.array(met.normal), np.array(met.getNearestPoint1())))
-    crossed = np.array(found)
+    crossed = _slid(first, second, near, across(near.normal)[:2], EDGE).reshape(4, 2, 3)
+    crossed[:, 0] *= -1.0
     return np.asarray(crossed[np.linalg.norm(crossed[:, 0], axis=1) > 0.5])
 
 
-def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: float = 0.0) -> Array:
+def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -> Array:
     """Directions (b, 3), each times the root of the distance's second derivative when round pieces slide along it."""
     i, j = near.pieces
-    a, b = first.placed(i, state), second.placed(j, state)
     round_by = max(_roundness(first, i), radius) + _roundness(second, j)
     if round_by == 0.0:
         return np.zeros((0, 3))
     along = across(near.normal)[:2]
     # share of the radius, by which pieces are moved along each other to see how their normal turns
-    turned, step = np.empty((2, 2)), 1e-2 * round_by
-    for row, way in enumerate(along):
-        normals = []
-        for sign in (-step, step):
-            slid = pin.SE3(b.rotation, b.translation + sign * way)
-            normals.append(np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
-        turned[row] = along @ (normals[1] - normals[0]) / (2.0 * step)
+    step = 1e-2 * round_by
+    normals = _slid(first, second, near, along, step)[:, :, 0]
+    turned = (along @ (normals[:, 1] - normals[:, 0])[:, :, None])[:, :, 0] / (2.0 * step)
     values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
-    values = np.where(np.isfinite(values), np.clip(values, 0.0, 2.0 / round_by), 0.0)
+    values = np.where(np.isfinite(values), np.minimum(np.maximum(values, 0.0), 2.0 / round_by), 0.0)
     return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
+
+
+def _slid(first: Surface, second: Surface, near: Nearest, along: Array, step: float) -> Array:
+    """Normals and points on the first piece (2, 2, 2, 3), with the second slid back and on along two ways (2, 3)."""
+    i, j = near.pieces
+    at, place = near.places
+    ours, theirs, found = coal.Transform3s(at), coal.Transform3s(place), np.empty((2, 2, 2, 3))
+    for row, ends in enumerate(place.translation + step * np.array([-along, along])):
+        for way, end in enumerate(ends):
+            theirs.setTranslation(end)
+            met = between_transforms(first.shapes[i], ours, second.shapes[j], theirs)
+            found[way, row, 0], found[way, row, 1] = met.normal, met.getNearestPoint1()
+    return found
 
 
 def _roundness(surface: Surface, number: int) -> float:
@@ -112,7 +130,8 @@ def _behind(surface: Surface, number: int, placement: pin.SE3, normals: Array) -
     if len(swept.points) == 0:
         return np.vstack([outermost(surface.shapes[number], placement, -normal, swept) for normal in normals])
     placed = swept.points @ placement.rotation.T + placement.translation
-    return np.asarray(placed[np.argmin(normals @ placed.T, axis=1)] - swept.radius * normals)
+    behind: Array = placed[(normals @ placed.T).argmin(axis=1)]
+    return behind - swept.radius * normals if swept.radius else behind
 
 
 def _heights(surface: Surface, pieces: Sequence[int], places: Sequence[pin.SE3], ways: Array) -> Array:

@@ -6,7 +6,7 @@ are asked for, so a thing that is moved after a term was resolved is found where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import coal
@@ -30,6 +30,7 @@ POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
 STANDING = -1  # the number of what no posture moves
 MOST_KEPT = 256  # surfaces and pairs of which a state keeps where they are: hundreds of problems may share one
+NO_REACH = np.zeros(0)
 _REQUEST = coal.DistanceRequest()
 _REQUEST.gjk_tolerance = _REQUEST.epa_tolerance = ACCURACY
 
@@ -54,7 +55,7 @@ class Surface(NamedTuple):
     pieces: tuple[int, ...]  # (k,) indices of the pieces in it
     joints: tuple[int, ...]  # (k,) joint that carries each
     shapes: tuple[Any, ...]  # (k,) coal's shapes
-    reach: tuple[float, ...]  # (k,) radius of each about its origin, metres
+    reach: Array  # (k,) radius of each about its origin, metres
     # (k,) their points and flat faces, which take longer to find than what they are asked for
     swept: tuple[SweptPoints, ...]
     fixed: Any = None  # placement of a point in its joint; None for pieces
@@ -63,7 +64,7 @@ class Surface(NamedTuple):
     def with_shapes(self, shapes: tuple[Any, ...]) -> Surface:
         """The same pieces with other shapes."""
         swept = tuple(swept_points(shape) for shape in shapes)
-        return with_values(self, shapes=shapes, reach=tuple(float(each.reach) for each in swept), swept=swept)
+        return with_values(self, shapes=shapes, reach=np.array([each.reach for each in swept]), swept=swept)
 
     def placed(self, number: int, state: State) -> Any:
         """Placement (pin.SE3) of a piece in the world."""
@@ -71,22 +72,25 @@ class Surface(NamedTuple):
 
     def where(self, state: State) -> Where:
         """Where the pieces are: of a thing that stands still, from the posture before."""
-        key, first = id(self.shapes), self._local(0)
+        key, fixed = id(self.shapes), self.fixed
+        first = self.geometry.geometryObjects[self.pieces[0]].placement if fixed is None else fixed
         kept: Where | None = state.kept.get(key)
         if kept is not None and kept.number in (state.number, STANDING) and kept.first == first:
             return kept
         if len(state.kept) > MOST_KEPT:
             state.kept.clear()
-        places = [state.data.oMi[joint] * self._local(number) for number, joint in enumerate(self.joints)]
+        joints = state.data.oMi
+        if fixed is not None:
+            places = [joints[self.joints[0]] * first]
+        else:
+            pieces = self.geometry.geometryObjects
+            places = [joints[joint] * pieces[k].placement for joint, k in zip(self.joints, self.pieces, strict=True)]
         for number, one in self.flesh:
-            places[number] = one.placed(self.geometry, state.data.oMi)
+            places[number] = one.placed(self.geometry, joints)
         number = state.number if any(self.joints) else STANDING
         origins = np.array([place.translation for place in places])
         found = state.kept[key] = Where(number, pin.SE3(first), places, origins, self.shapes)
         return found
-
-    def _local(self, number: int) -> Any:
-        return self.fixed if self.fixed is not None else self.geometry.geometryObjects[self.pieces[number]].placement
 
 
 class Nearest(NamedTuple):
@@ -98,6 +102,13 @@ class Nearest(NamedTuple):
     joint: int  # joint that carries the piece of the second surface
     against: int  # joint that carries the piece of the first
     pieces: tuple[int, int]  # number of the piece of the first surface, and of the second
+    where: tuple[Where, Where]  # all pieces of the first surface, and of the second
+
+    @property
+    def places(self) -> tuple[pin.SE3, pin.SE3]:
+        """Where the two pieces are in the world."""
+        (i, j), (one, other) = self.pieces, self.where
+        return one.places[i], other.places[j]
 
 
 def surface(scene: Scene, name: str, where: str) -> Surface:
@@ -125,7 +136,7 @@ def surface(scene: Scene, name: str, where: str) -> Surface:
         rigid = carried_by(scene, name, joint)
         if rigid.pieces:
             return rigid
-    return Surface(name, (), None, (), (joint,), (), (), (), frame.placement).with_shapes((coal.Sphere(POINT),))
+    return Surface(name, (), None, (), (joint,), (), NO_REACH, (), frame.placement).with_shapes((coal.Sphere(POINT),))
 
 
 def joined(scene: Scene, name: str, owners: Collection[str]) -> Surface:
@@ -178,7 +189,7 @@ def _of_pieces(scene: Scene, name: str, indices: Sequence[int]) -> Surface:
 def _made(name: str, owners: tuple[str, ...], geometry: pin.GeometryModel, indices: Sequence[int]) -> Surface:
     pieces = [geometry.geometryObjects[index] for index in indices]
     joints, shapes = tuple(int(piece.parentJoint) for piece in pieces), tuple(piece.geometry for piece in pieces)
-    return Surface(name, owners, geometry, tuple(indices), joints, (), (), ()).with_shapes(shapes)
+    return Surface(name, owners, geometry, tuple(indices), joints, (), NO_REACH, ()).with_shapes(shapes)
 
 
 def nearest(first: Surface, second: Surface, state: State) -> Nearest:
@@ -208,22 +219,30 @@ def _nearest(first: Surface, second: Surface, one: Where, other: Where) -> Neare
         length = float(np.linalg.norm(apart))
         normal = apart / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
     middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
-    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
+    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j), (one, other))
 
 
-def _pairs(first: Surface, ours: Array, second: Surface, theirs: Array) -> Iterator[tuple[float, int, int]]:
+def _pairs(first: Surface, ours: Array, second: Surface, theirs: Array) -> Iterable[tuple[float, int, int]]:
     """Pairs of pieces with origins (k, 3) after a lower bound of their distance, the least first."""
     if len(ours) == len(theirs) == 1:
-        return iter([(-np.inf, 0, 0)])
+        return [(-np.inf, 0, 0)]
     apart = ours[:, None] - theirs
-    least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
-    return ((float(least.flat[k]), *divmod(int(k), len(theirs))) for k in np.argsort(least, axis=None, kind="stable"))
+    least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - (first.reach[:, None] + second.reach)
+    bounds, count = least.ravel(), len(theirs)
+    order = bounds.argsort(kind="stable")
+    return ((bound, *divmod(k, count)) for bound, k in zip(bounds[order].tolist(), order.tolist(), strict=True))
 
 
 def between_pieces(first: Any, placed: pin.SE3, second: Any, other: pin.SE3) -> Any:
     """Coal's distance of two shapes at their placements."""
+    return between_transforms(first, coal.Transform3s(placed), second, coal.Transform3s(other))
+
+
+def between_transforms(first: Any, placed: Any, second: Any, other: Any) -> Any:
+    """The same at coal's transforms, of which one may be kept while the other moves."""
+    # One of coal's functors, kept for several calls, remembers where a hull was last: its digits differ.
     result = coal.DistanceResult()
-    coal.distance(first, coal.Transform3s(placed), second, coal.Transform3s(other), _REQUEST, result)
+    coal.distance(first, placed, second, other, _REQUEST, result)
     return result
 
 
