@@ -185,6 +185,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         return corrected(self, *given)
 
     return {
+        "watchdog": (descent, "_is_tentative", lambda self, here, there: False),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),

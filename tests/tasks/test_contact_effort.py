@@ -183,7 +183,7 @@ def test_where_things_make_an_answer_dear_a_lower_minimum_is_sought(name: str, n
 def test_more_time_buys_a_lower_minimum() -> None:
     from wholebody.bench.suite.problem_sets.registry import problem_set
 
-    problem = problem_set("passage").make(13, 0).problem
+    problem = problem_set("passage").make(5, 0).problem
     first = wb.solve(problem, ONE_START)
     bought = wb.solve(problem, replace(ONE_START, restarts_for_measure=1, time_limit=60.0))
     assert first.status == bought.status == "solved"

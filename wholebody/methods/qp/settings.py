@@ -79,6 +79,7 @@ class DescentNumbers(NamedTuple):
     # reach.
     least_gain: float = 1e-3
     least_gain_alone: float = 1e-7
+    restorable: float = 0.03  # m, rad: violation that the next step is trusted to repair. Larger: more taken back.
     near_met: float = 1e-4  # m, rad. Residuals below which multipliers act. Larger: they act on what has other causes.
     width: float = 0.02  # of the funnel at first. Wider: longer steps along constraints, more to restore.
     switch: float = 10.0  # times the squared violation that measures lead above. Smaller: they lead far from the goals.

@@ -40,6 +40,7 @@ class SQP(Stage):
         self._radius, self._full_step = DESCENT.first_radius, self.full_step
         self._damping = DESCENT.full_step_damping[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
+        self._watched: Iterate | None = None  # where to return if a tentative step is not repaired
         self._unimproved = 0  # feasible postures in a row that are hardly better than the best
         self._kept: Iterate | None = None  # best feasible posture
         self._gain = 1.0  # share of its tangential part that a step has
@@ -80,6 +81,9 @@ class SQP(Stage):
             if there is not None:
                 here = there
                 self._keep(here)
+            elif self._watched is not None:
+                here, self._watched = self._watched, None
+        here = here if self._watched is None else self._watched
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return self.ended(here, converged, count)
@@ -99,7 +103,7 @@ class SQP(Stage):
         """Continue from a feasible posture with a narrower funnel."""
         self._width *= 0.3  # 0.5 ends at infeasible postures again; 0.1 makes steps along contacts tiny
         self._radius, self._gain, self._damping = DESCENT.first_radius, 1.0, 0.0
-        self._shift = np.zeros_like(self._shift)
+        self._shift, self._watched = np.zeros_like(self._shift), None
         return kept
 
     def _keep(self, here: Iterate) -> None:
@@ -194,9 +198,14 @@ class SQP(Stage):
             self._reject(float(np.abs(step.dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
-        if acceptance.accepted and self.jumps(here, there):
-            acceptance = StepAcceptance(False, False, False, "blocked")
-        self.record(there, acceptance.by)
+        watched = not acceptance.accepted and self._is_tentative(here, there)
+        if (acceptance.accepted or watched) and self.jumps(here, there):
+            acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
+        self.record(there, "tentative" if watched else acceptance.by)
+        if watched:
+            self._watched = here
+            self._shift = np.zeros_like(self._shift)
+            return there
         if not acceptance.accepted:
             self._reject(there.longest, acceptance.by)
             return None
@@ -235,6 +244,7 @@ class SQP(Stage):
             self._gain *= 0.5
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
+        self._watched = None
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
         self._shift = residual if np.abs(residual).max(initial=0.0) < DESCENT.near_met else np.zeros_like(residual)
@@ -258,11 +268,23 @@ class SQP(Stage):
         there.rows.soft_error[: there.rows.goals] -= self.offset
         return with_values(there, violation=self.shared.subproblem.violation(there.rows))
 
+    def _is_tentative(self, here: Iterate, there: Iterate) -> bool:
+        """Whether a rejected step reduced the goal errors and violates constraints little (watchdog)."""
+        if self._watched is not None or not self.measures:
+            return False
+        broken = max(there.violation.elastic, there.violation.hold)
+        return there.violation.goal < here.violation.goal and broken < DESCENT.restorable
+
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
-        """Judge a step by the measures, near the goals by the Lagrangian."""
+        """Judge a step, or two if the first one was tentative: then both together must be acceptable."""
+        predicted, before = step.predicted, here
+        if self._watched is not None:
+            before = self._watched
+            least = max(0.1 * predicted.violation, 1e-3 * before.violation.total)
+            predicted = with_values(predicted, violation=least)
         measures = [
             one.at.measure if step.multipliers is None else lagrangian(step.multipliers, one.at.measure, one.rows)
-            for one in (here, there)
+            for one in (before, there)
         ]
-        values = (here.violation.total, measures[0]), (there.violation.total, measures[1])
-        return judge(*values, step.predicted, self._width if self.measures else None)
+        values = (before.violation.total, measures[0]), (there.violation.total, measures[1])
+        return judge(*values, predicted, self._width if self.measures else None)
