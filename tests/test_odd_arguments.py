@@ -300,6 +300,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "RigidBodies.contacts", Call(engine.contacts, {"names": ["ball"]})
     yield "RigidBodies.put", Call(engine.put, {"name": "ball", "at": pin.SE3.Identity()})
     yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
+    wrench = {"name": "ball", "wrench": (0.0, 0.1, 0.0, 0.0, 0.0, 0.01)}
+    yield "RigidBodies.push_about_centre", Call(engine.push_about_centre, wrench, lambda _: engine.energy())
     spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
     yield "Spring", Call(wb.dynamics.Spring, spring, lambda made: made.transition(0.1))
     yield "Spring.transition", Call(wb.dynamics.Spring().transition, {"time": 0.1})

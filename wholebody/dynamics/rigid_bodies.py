@@ -150,7 +150,7 @@ class RigidBodies:
         number, twist = self._number(name), self.state.bodies.twist
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        before = twist[number].copy()
+        wrench, before = _bounded(wrench, 1e6 * FARTHEST, "wrench", 6), twist[number].copy()
         self.state.velocity[number] += wrench[:3] / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ wrench[3:]
         self.state.bodies.moving[self._joints.linked(number)] = True
@@ -391,9 +391,9 @@ class RigidBodies:
         return least, max(0.0, self.energy() - before)
 
 
-def _bounded(value: object, most: float, what: str) -> Array:
-    """Three numbers, none of them beyond `most`."""
-    numbers = np.array(checks.numbers(value, (3,), what))
+def _bounded(value: object, most: float, what: str, count: int = 3) -> Array:
+    """So many numbers, none of them beyond `most`."""
+    numbers = np.array(checks.numbers(value, (count,), what))
     if np.abs(numbers).max() > most:
         raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
     return numbers

@@ -15,7 +15,7 @@ from wholebody.tasks.balance import Balance, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.checks import is_a
-from wholebody.tasks.distance import Effort
+from wholebody.tasks.distance import Effort, without_freedoms
 from wholebody.tasks.forces import LoadedBalance
 from wholebody.tasks.frame import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
@@ -72,7 +72,7 @@ def default_measures(
     pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
     effort, rhythm = _effort.resolve(scene, rest), _rhythm.resolve(scene, rest)
     if seated:
-        effort = effort.apart_from(_ways(scene, seated))
+        effort = without_freedoms(effort, _ways(scene, seated))
         rhythm = rhythm.of_arms(inputs.once(scene, ("places", seated), partial(_places, scene, seated)))
 
     def kept(kind: type[Stance | Hang], names: tuple[str, ...]) -> Measure:  # whatever the start is, it is the same

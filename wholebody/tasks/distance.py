@@ -138,11 +138,12 @@ class Effort(DistanceMeasure):
         """Store the start."""
         return filled(self, distance=SquaredDistance.build(start, scene.figure.effort_weights))
 
-    def apart_from(self, idx_v: Sequence[int]) -> Effort:
-        """Itself, resolved, without the displacement of those degrees of freedom."""
-        weights = self.distance.weights.copy()
-        weights[list(idx_v)] = 0.0
-        return filled(self, distance=SquaredDistance.build(self.distance.reference, weights))
+
+def without_freedoms(effort: Effort, idx_v: Sequence[int]) -> Effort:
+    """A resolved effort in which the displacements of those degrees of freedom cost nothing."""
+    weights = effort.distance.weights.copy()
+    weights[list(idx_v)] = 0.0
+    return filled(effort, distance=SquaredDistance.build(effort.distance.reference, weights))
 
 
 @dataclass(frozen=True, eq=False)
