@@ -361,6 +361,7 @@
   let drawn = null; // width and height of a page for pictures
   const fit = viewer.set_3d_pane_size.bind(viewer);
   viewer.set_3d_pane_size = () => drawn ? fit(...drawn) : fit(); // meshcat calls it when the window changes
+  viewer.set_3d_pane_size(); // and in the next frame, before which a picture would have a canvas's first size
   function resize(width, height) {
     drawn = [width, height];
     pane.style.display = "none"; // a picture is read from its canvas: nothing of it goes to a screen
@@ -397,6 +398,7 @@
     camera.fov = cmd.fov;
     camera.near = 0.02;
     camera.far = 200;
+    camera.updateProjectionMatrix();
     camera.position.copy(eye);
     viewer.controls.target.copy(target);
     viewer.controls.update();
