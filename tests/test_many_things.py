@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -28,6 +29,17 @@ def crowd(count: int, spread: float = 1.2) -> wb.Scene:
         shape = wb.Sphere(0.02) if k % 2 else wb.Box((0.03, 0.02, 0.05))
         scene.add(shape, name=f"thing {k}", at=rng.uniform(-spread, spread, 3) + (0.0, 0.0, 1.0))
     return scene
+
+
+def by_coal(scene: wb.Scene, data: pin.Data, q: Any) -> Any:
+    """Distances of all pairs at q by Pinocchio and coal alone."""
+    geometry = scene.geometry
+    pin.forwardKinematics(scene.model, data, q)
+    exact = pin.GeometryData(geometry)
+    pin.updateGeometryPlacements(scene.model, data, geometry, exact)
+    settle(geometry, exact)
+    pin.computeDistances(geometry, exact)
+    return np.array([result.min_distance for result in exact.distanceResults])
 
 
 @pytest.fixture
@@ -83,7 +95,7 @@ def test_judging_among_many_things_is_asking_coal_for_every_pair(floor: bool) ->
         scene.add(shape, name=f"thing {k}", at=(*rng.uniform(-2.0, 2.0, 2), rng.uniform(0.0, 2.0), *turn))
     if floor:
         scene.add(wb.HalfSpace(), name="floor")
-    geometry, table = scene.geometry, scene.pair_table
+    table = scene.pair_table
     assert len(table.pairs) >= all_pairs.MANY
     pairs, data, within = (
         AllPairs(scene.built),
@@ -93,12 +105,7 @@ def test_judging_among_many_things_is_asking_coal_for_every_pair(floor: bool) ->
     for shift in (0.0, 0.5, 30.0):
         q = scene.figure.posture(scene.figure.postures[0])
         q[:3] += shift
-        pin.forwardKinematics(scene.model, data, q)
-        exact = pin.GeometryData(geometry)
-        pin.updateGeometryPlacements(scene.model, data, geometry, exact)
-        settle(geometry, exact)
-        pin.computeDistances(geometry, exact)
-        wanted = np.array([result.min_distance for result in exact.distanceResults])
+        wanted = by_coal(scene, data, q)
         pairs.move(q)
         assert pairs.least == pytest.approx(wanted.min(), abs=2e-6)
         near = pairs.nearer(within)
@@ -127,18 +134,13 @@ def test_near_pairs_of_two_figures_among_many_things_are_those_that_coal_finds()
     assert first[-1] == len(members) == len(set(members.tolist()))
     assert (np.bincount(second[second >= 0])[-200:] == 2).all()  # each thing beside both
     assert len(begin) == len(second) + 1
-    geometry, data = scene.geometry, scene.model.createData()
+    data = scene.model.createData()
     rest = scene.figure.posture(scene.figure.postures[0])
     last, before, passed, met = None, rest, 0, 0
     with scene.borrow() as workspace:
         for shift in (0.0, 0.4, 50.0, 1.0, 1.01, 2.0):
             q = pin.integrate(scene.model, rest, np.concatenate([[shift, 0, 0], np.zeros(scene.model.nv - 3)]))
-            pin.forwardKinematics(scene.model, data, q)
-            exact = pin.GeometryData(geometry)
-            pin.updateGeometryPlacements(scene.model, data, geometry, exact)
-            settle(geometry, exact)
-            pin.computeDistances(geometry, exact)
-            wanted = np.array([result.min_distance for result in exact.distanceResults])
+            wanted = by_coal(scene, data, q)
             for within in (0.0, 0.3):
                 found = workspace.near(q, within)
                 assert set(np.flatnonzero(wanted < within - 2e-6)) <= set(found.number)
