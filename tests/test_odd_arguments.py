@@ -718,7 +718,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
     several = {"most": 2, "apart": 0.2, "starts": 2, "seed": 0, "time_limit": 1.0}
     yield "solutions", Call(wb.solutions, {"problem": ask, **several}, str)
-    listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False}
+    listed = {"answers": (), "found": 0, "descents": 0, "starts": 0, "complete": False, "ended": ""}
     yield "Solutions", Call(Solutions, listed)
     yield "QP.minima", Call(wb.methods.QP().minima, {"problem": ask, "starts": [ask.start]}, list)
     varied = {"task": path / "task.toml", "layouts": {"as it is": {}}}

@@ -228,3 +228,51 @@ def test_a_search_tells_how_far_it_is_and_can_be_ended(arm: wb.Figure, capsys: p
     assert "2 of 2" in capsys.readouterr().err
     with pytest.raises(wb.InputError, match="solutions: progress"):
         wb.solutions(problem, progress=3)  # type: ignore[arg-type]
+
+
+def test_two_arms_have_every_combination_of_their_branches() -> None:
+    """Each UR5 has up to eight branches (Hawkins 2013); as far apart as they are here, any of one goes with any."""
+    figure, ready = known_arm("ur5")
+    tools = [
+        figure.placement(np.array(q), "tool")
+        for q in ((0.4, -1.2, 1.4, -1.1, -1.3, 0.2), (-0.8, -0.9, 1.2, 0.4, 1.1, -0.6))
+    ]
+    counts = [
+        len(wb.solutions(wb.Problem(wb.Scene(figure), ready, goals=[wb.Frame("tool", tool)]), most=100))
+        for tool in tools
+    ]
+    away = pin.SE3(np.eye(3), np.array((4.0, 0.0, 0.0)))
+    scene = wb.Scene({"one": figure, "other": (figure, away)})
+    goals = [wb.Frame("one/tool", tools[0]), wb.Frame("other/tool", away * tools[1])]
+    problem = wb.Problem(scene, np.tile(ready, 2), goals=goals)
+    found = wb.solutions(problem, most=100)
+    assert found.complete
+    assert len(found) == counts[0] * counts[1] > 8
+    for answer in found:
+        for q, tool in zip((answer.q[:6], answer.q[6:]), tools, strict=True):
+            assert figure.placement(q, "tool").homogeneous == pytest.approx(tool.homogeneous, abs=1e-4)
+    few = wb.solutions(problem, starts=9)
+    assert (few.starts, few.complete) == (9, False)
+    # the combinations of least effort come first
+    assert [one.assessment.measure for one in few] == pytest.approx([one.assessment.measure for one in found[:8]])
+
+
+def test_the_search_of_three_figures_ends_where_starts_change_nothing(planar_arm: Callable[..., wb.Figure]) -> None:
+    """Answers of figures multiply: here two times two times two curves, of which one answer is asked for."""
+    arm = planar_arm((0.5, 0.4, 0.3))
+    scene = wb.Scene({name: (arm, (3.0 * k, 0.0, 0.0)) for k, name in enumerate("abc")})
+    goals = [wb.Point(f"{name}/tip", (3.0 * k + 0.6, 0.4, 0.0)) for k, name in enumerate("abc")]
+    found = wb.solutions(wb.Problem(scene, np.full(9, 0.3), goals=goals), most=1)
+    assert 40 < found.starts < 300
+    assert not found.complete
+    assert "the last 40 starts changed none" in str(found)
+
+
+def test_without_a_time_limit_a_bound_of_the_processor_ends_it(arm: wb.Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A descent of figures in contact takes seconds, and 300 of them would be no answer; infinity is no limit."""
+    monkeypatch.setattr("wholebody.planning.distinct_solutions.LONGEST", 1e-9)
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (0.5, 0.2, 0.5))])
+    found = wb.solutions(problem)
+    assert (found.starts, found.complete) == (1, False)
+    assert "time limit" in found.ended
+    assert wb.solutions(problem, time_limit=np.inf, starts=3).starts == 3

@@ -16,6 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.batches import reporter
 from wholebody.methods.base import TIME_LIMIT, check_problem
 from wholebody.methods.contradictions import contradictions
+from wholebody.methods.control import BUDGET, within_budget
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
 from wholebody.methods.starts import all_found, throughout
@@ -24,6 +25,8 @@ from wholebody.solution import Solution
 
 STAYED = 0.01  # rad, m: by which a descent moves less from a minimum
 SETTLING = 10  # most descents from the end of one; of arms of seven joints more than three are rare
+UNCHANGED = 40  # starts in a row that change none of what is returned: by Laplace's rule the next does 1 time in 42
+LONGEST = 60.0  # s of the processor without a time limit: answers of several figures multiply, and so do descents
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Solutions(Sequence[Solution]):
             start where the problem is proven to have no answer, as beyond an arm's length. Else never where
             neighbours of an answer meet the goals, as those of redundant arms and of people do, and only after 40
             descents.
+        ended: why no other start was made, in words.
 
     Examples:
         >>> found = wb.solutions(problem, most=2, starts=4)
@@ -52,6 +56,7 @@ class Solutions(Sequence[Solution]):
     descents: int
     starts: int
     complete: bool
+    ended: str = ""
 
     def __len__(self) -> int:
         """Return the number of answers."""
@@ -66,7 +71,9 @@ class Solutions(Sequence[Solution]):
         return self.answers[index]
 
     def __str__(self) -> str:
-        more = "the search seems complete" if self.complete else "there may be more"
+        more = (
+            "the search seems complete" if self.complete else "there may be more" + f": {self.ended}" * bool(self.ended)
+        )
         lines = [f"{self.found} distinct answers of {self.descents} descents from {self.starts} starts; {more}"]
         lines += [f"  {number}: measure {answer.assessment.measure:.4g}" for number, answer in enumerate(self.answers)]
         return "\n".join(lines)
@@ -85,9 +92,9 @@ def solutions(
     """Return distinct answers of a problem: local minima of its measures that meet its goals and keep what must hold.
 
     Descents begin at the branches of the closed form of an arm that has one, of seven joints where these take the least
-    effort. If these are not all, they also begin at the problem's start and at random postures (a Latin hypercube).
-    Measures count from the problem's start. The search ends where all answers count as found, or after as many starts
-    or seconds.
+    effort, and of several arms at their combinations. If these are not all, they also begin at the problem's start and
+    at random postures (a Latin hypercube). Measures count from the problem's start. The search ends where all answers
+    count as found, where 40 starts in a row changed none that is returned, or after as many starts or seconds.
 
     Args:
         problem: as for `wb.solve`.
@@ -96,7 +103,8 @@ def solutions(
             out; of two that are nearer the one of the lesser measure is kept.
         starts: most descents.
         seed: of the random postures.
-        time_limit: seconds after which it ends, the last descent too; the first always begins. None for no limit.
+        time_limit: seconds after which it ends, the last descent too; the first always begins; infinite for no limit.
+            Where None, it ends after a minute of processor time.
         progress: called after each descent with the number of descents and the most there will be; the search ends if
             it returns True. True prints a line.
 
@@ -115,31 +123,71 @@ def solutions(
     ends = np.inf if time_limit is None else time.perf_counter() + TIME_LIMIT(time_limit, "solutions: time_limit")
     with problem.borrow() as workspace:
         if contradictions(problem, workspace):
-            return Solutions((), 0, 0, 0, True)
-    known: list[Solution] = []
-    begun = descents = 0
-    (branches, every), complete = closed_form_postures(problem), False
+            return Solutions((), 0, 0, 0, True, "it is proven that there is none")
+    known, least = _Known(problem.scene.model, apart), np.zeros(0)
+    begun = descents = unchanged = 0
+    (branches, every), complete = closed_form_postures(problem, starts), False
     every = every and len(branches) > 0 and _stand_alone(problem, branches)
-    total = min(starts, len(branches)) if every else starts
-    for start in islice(chain(branches, () if every else _starts(problem, starts, seed)), total):
-        left = ends - time.perf_counter()
-        if left <= 0.0 and begun:
-            break
-        # the first descent begins however long it took to get here
-        answer = next(_method(time_limit, ends).minima(problem, [start]))
-        begun += 1
-        if answer.solved:
-            descents += 1
-            if all(_difference(problem.scene.model, answer.q, one.q) >= apart for one in known):
-                answer = _settled(problem, answer, time_limit, ends)
-            known = _with(problem, known, answer, apart)
-        # After 12 descents minima at limits, which few starts lead to, were missed.
-        complete = begun == len(branches) if every else all_found(len(known), descents, 40)
-        if (told is not None and told(begun, total) is True) or complete:
-            break
-    complete = complete and _stand_alone(problem, [answer.q for answer in known])
-    ordered = sorted(known, key=lambda answer: answer.assessment.measure)
-    return Solutions(tuple(ordered[:most]), len(known), descents, begun, complete)
+    total = len(branches) if every else starts
+    ended = f"{total} starts were made"
+    with within_budget(LONGEST if time_limit is None else np.inf):
+        for start in islice(chain(branches, () if every else _starts(problem, starts, seed)), total):
+            if begun and (BUDGET.over or ends <= time.perf_counter()):  # the first begins however long it took so far
+                ended = f"the time limit of {LONGEST if time_limit is None else time_limit:g} s ended it"
+                break
+            answer = next(_method(time_limit, ends).minima(problem, [start]))
+            begun += 1
+            if answer.solved:
+                descents += 1
+                if known.near(answer.q) is None:
+                    answer = _settled(problem, known, answer, time_limit, ends)
+                known.add(answer)
+            before, least = least, known.measures[:most]
+            same = len(before) == len(least) and np.allclose(before, least, rtol=1e-3)
+            unchanged = unchanged + 1 if same else 0
+            # After 12 descents minima at limits, which few starts lead to, were missed.
+            complete = begun == len(branches) if every else all_found(len(known.answers), descents, 40)
+            stopped = told is not None and told(begun, total) is True
+            if stopped or complete or (unchanged == UNCHANGED and not every):
+                last = f"the last {unchanged} starts changed none of the least {most}"
+                ended = "progress ended it" if stopped else "other starts lead to no others" if complete else last
+                break
+    found = known.answers
+    complete = complete and _stand_alone(problem, [answer.q for answer in found])
+    return Solutions(tuple(found[:most]), len(found), descents, begun, complete, ended)
+
+
+class _Known:
+    """Answers that are apart, the one of the least measure first."""
+
+    def __init__(self, model: pin.Model, apart: float) -> None:
+        kinds = [joint for joint in model.joints[1:] if joint.nv == 1 and joint.shortname().startswith("JointModelR")]
+        self._hinges = [joint.idx_v for joint in kinds]
+        self._model, self._apart = model, apart
+        self.answers: list[Solution] = []
+
+    @property
+    def measures(self) -> Array:
+        """Those of the answers, ascending."""
+        return np.array([answer.assessment.measure for answer in self.answers])
+
+    def difference(self, one: Array, other: Array) -> float:
+        """Greatest difference of two postures (nq,) in a degree of freedom; a whole turn of a hinge is none."""
+        way = np.asarray(pin.difference(self._model, one, other))
+        way[self._hinges] -= 2.0 * np.pi * np.round(way[self._hinges] / (2.0 * np.pi))
+        return float(np.abs(way).max(initial=0.0))
+
+    def near(self, q: Array) -> Solution | None:
+        """The first answer that is not apart from a posture (nq,); None where all are."""
+        return next((one for one in self.answers if self.difference(one.q, q) < self._apart), None)
+
+    def add(self, answer: Solution) -> None:
+        """Add an answer, unless one of no greater measure is near; of greater ones those that are near go."""
+        nearest = self.near(answer.q)
+        if nearest is not None and nearest.assessment.measure <= answer.assessment.measure:
+            return
+        kept = [one for one in self.answers if self.difference(one.q, answer.q) >= self._apart]
+        self.answers = sorted([*kept, answer], key=lambda one: one.assessment.measure)
 
 
 def _method(time_limit: float | None, ends: float) -> QP:
@@ -147,11 +195,11 @@ def _method(time_limit: float | None, ends: float) -> QP:
     return QP(time_limit=None if time_limit is None else max(ends - time.perf_counter(), 1e-9))
 
 
-def _settled(problem: Problem, answer: Solution, time_limit: float | None, ends: float) -> Solution:
+def _settled(problem: Problem, known: _Known, answer: Solution, time_limit: float | None, ends: float) -> Solution:
     """The end of descents from an answer and from their ends in turn, until one stays where it begins."""
     for _ in range(SETTLING):
         after = next(_method(time_limit, ends).minima(problem, [answer.q]))
-        if not after.solved or _difference(problem.scene.model, after.q, answer.q) < STAYED:
+        if not after.solved or known.difference(after.q, answer.q) < STAYED:
             break
         answer = after
     return answer
@@ -170,22 +218,3 @@ def _starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     state, rng = problem.scene.state(problem.start), np.random.default_rng(seed)
     others = throughout(problem, state, problem.start, rng, count - 1) if count > 1 else iter(())
     return chain([problem.scene.figure.clamp(problem.start)], others)
-
-
-def _with(problem: Problem, known: list[Solution], answer: Solution, apart: float) -> list[Solution]:
-    """The answers known with another one, of which those of the least measure stay that are apart."""
-    kept = list[Solution]()
-    for one in sorted([*known, answer], key=lambda each: each.assessment.measure):
-        if all(_difference(problem.scene.model, one.q, other.q) >= apart for other in kept):
-            kept.append(one)
-    return kept
-
-
-def _difference(model: pin.Model, one: Array, other: Array) -> float:
-    """Greatest difference of two postures (nq,) in a degree of freedom; a whole turn of a hinge is none."""
-    way = np.asarray(pin.difference(model, one, other))
-    hinges = [
-        joint.idx_v for joint in model.joints[1:] if joint.nv == 1 and joint.shortname().startswith("JointModelR")
-    ]
-    way[hinges] -= 2.0 * np.pi * np.round(way[hinges] / (2.0 * np.pi))
-    return float(np.abs(way).max(initial=0.0))

@@ -78,7 +78,8 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         chain = chains.carrying(entries)
         if chain is None:
             return None
-        asked, distance = Asked.by(problem, chain, entries, settings.measures)
+        distance = distance_of(problem, chain) if settings.measures else None
+        asked = Asked.by(problem, chain, entries, distance)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
         return Descents(asked, chain, rule, workspace, settings, control).run()
 
@@ -92,35 +93,39 @@ class Asked(NamedTuple):
     clearances: Array  # (pairs,) metres
 
     @classmethod
-    def by(
-        cls, problem: Problem, chain: PlainChain, entries: list[Entry], measures: bool = True
-    ) -> tuple[Asked, SquaredDistance | None]:
-        """What a problem with these entries asks, and its measure where that is a squared distance."""
+    def by(cls, problem: Problem, chain: PlainChain, entries: list[Entry], distance: SquaredDistance | None) -> Asked:
+        """What a problem with these entries asks, whose measure is a squared distance; None where none counts."""
         at = problem.scene.figure.clamp(problem.start)
-        distance = distance_of(problem, chain) if measures else None
         nearest = np.zeros((2, len(chain.idx_v)))
         nearest[0] = chain.angles(at if distance is None else distance.reference)
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
-        return cls(chain.goals(entries), at, nearest, problem.clearances), distance
+        return cls(chain.goals(entries), at, nearest, problem.clearances)
 
 
-def closed_form_postures(problem: Problem) -> tuple[Array, bool]:
-    """Postures (k, nq) of a closed form that meet a placement or nearly do, free or not, and whether they are all.
+def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
+    """Postures (k, nq) of closed forms that meet placements or nearly do, free or not, and whether they are all.
 
-    Of seven joints they are those of the least effort along each branch; none without a closed form.
+    Of several arms they are the `most` combinations of least effort, whose number is the product of those of each arm.
+    Of seven joints they are those of the least effort along each branch; none where an arm has no closed form.
     """
     entries, none = goal_entries(problem), np.zeros((0, problem.scene.model.nq))
     with chains_of(problem).borrow() as chains:
-        chain = None if entries is None else chains.carrying(entries)
-        if entries is None or chain is None or len(chain.idx_v) < problem.scene.model.nv:
+        whole = None if entries is None else chains.carrying(entries)
+        if entries is None or whole is None or len(whole.idx_v) < problem.scene.model.nv:
             return none, False
-        asked, _ = Asked.by(problem, chain, entries)
-        if not chain.is_guided(asked.goals):
-            return none, False
-        values = chain.branches(asked.goals, asked.nearest).least
-        found = chain.posture(values, np.tile(asked.at, (len(values), 1))) if len(values) else none
-        return found, chain.arm is not None and chain.held < 0
+        distance = distance_of(problem, whole)
+        found, effort, every = problem.scene.figure.clamp(problem.start)[None], np.zeros(1), True
+        for chain, own in chains.apart(entries):
+            asked = Asked.by(problem, chain, own, distance)
+            if not chain.is_guided(asked.goals):
+                return none, False
+            values = chain.branches(asked.goals, asked.nearest).least
+            total = (effort[:, None] + (values - asked.nearest[0]) ** 2 @ asked.nearest[1]).ravel()
+            first, branch = np.divmod(total.argsort(kind="stable")[:most], max(len(values), 1))
+            every = every and chain.arm is not None and chain.held < 0 and len(first) == len(total)
+            found, effort = chain.posture(values[branch], found[first]), total[first * len(values) + branch]
+        return found, every
 
 
 class Descents:

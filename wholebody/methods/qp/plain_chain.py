@@ -220,6 +220,21 @@ class Chains:
         """The chain that carries the frames of goals."""
         return self.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
 
+    def apart(self, entries: Sequence[Entry]) -> list[tuple[PlainChain, list[Entry]]]:
+        """The chains that carry the frames of goals and have no joint in common, each with its entries."""
+        groups = list[tuple[set[int], list[Entry]]]()
+        for entry in entries:
+            joints = {above for joint in entry.integers[:2] for above in self._model.supports[joint]} - {0}
+            own, others = [entry], list[tuple[set[int], list[Entry]]]()
+            for known, theirs in groups:
+                if known & joints:
+                    joints, own = joints | known, theirs + own
+                else:
+                    others.append((known, theirs))
+            groups = [*others, (joints, own)]
+        found = [(self.of(frozenset(joints)), own) for joints, own in groups]
+        return [(chain, own) for chain, own in found if chain is not None]
+
 
 def rows_of(goals: Goals) -> int:
     """How many rows the goals have."""
