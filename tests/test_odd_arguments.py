@@ -471,6 +471,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "DampedLeastSquares": wb.methods.DampedLeastSquares(),
     }.items():
         yield f"{name}.accepts", Call(made.accepts, {"problem": ask})
+        yield f"{name}.leaves_out", Call(made.leaves_out, {"problem": ask})
         if name in ("CCD", "Placo", "DampedLeastSquares"):
             yield f"{name}.tracker", Call(made.tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
     for name, made in {

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.bench.suite.adapters.mink import Mink
+from wholebody.bench.suite.adapters.pink import Pink
 from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.methods import METHODS
 from wholebody.methods.base import Method, UnsupportedTermError
@@ -52,6 +54,44 @@ def test_what_a_method_cannot_take_is_named_by_one_sentence_everywhere(name: str
     assert str(caught.value) == sentence
     with pytest.raises(UnsupportedTermError, match="Plane"):
         method.tracker(problem, 0.02).step(problem.start)
+
+
+LEFT_OUT = {
+    "qp": (), "newton": (),
+    "ccd": ("Balance (by default)",),
+    "placo": ("RangeOfMotion (by default)", "ReachCones (by default)"),
+    "dls": ("contacts", "RangeOfMotion (by default)", "ReachCones (by default)", "Balance (by default)"),
+    "pink": ("RangeOfMotion (by default)", "ReachCones (by default)", "Balance (by default)"),
+    "mink": ("RangeOfMotion (by default)", "ReachCones (by default)", "Balance (by default)"),
+}  # fmt: skip
+"""What methods do not look at of a person who stands, from their documentation; all others of these they keep."""
+
+
+@pytest.mark.parametrize("name", LEFT_OUT)
+def test_what_a_method_does_not_look_at_is_said_before_it_begins(name: str, human: wb.Figure) -> None:
+    tools: dict[str, type[Method]] = {"pink": Pink, "mink": Mink}
+    method = tools[name](1e-3) if name in tools else chosen(name)
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    there = human.placement(human.posture("standing"), "right_palm").translation
+    goals = [wb.Point("right_palm", there)]
+    problem = wb.Problem(wb.Scene(human), "standing", goals=goals, constraints=[] if name == "ccd" else feet)
+    if name == "ccd":  # which takes no hold that its joints move; of a start that stands this is the default
+        problem = wb.Problem(wb.Scene(human), "standing", goals=goals, balance=True)
+    said: tuple[str, ...] = method.leaves_out(problem)  # type: ignore[attr-defined]
+    assert said == LEFT_OUT[name]
+    if said and name not in tools:
+        with pytest.warns(UserWarning, match="the assessment alone judges") as told:
+            assert wb.solve(problem, method, lambda entry: True).method.startswith(name)
+        assert all(word in str(told[0].message) for word in said)
+
+
+def test_what_breaks_is_told_from_what_a_method_left_out(human: wb.Figure) -> None:
+    """Who is 0.3 m beside where the feet are to bear falls, and an arm does not change that: ccd does not look."""
+    problem = wb.Problem(wb.Scene(human), "standing", goals=[wb.Point("right_palm", (0.6, -0.3, 1.1))], balance=True)
+    problem = problem.with_start(problem.start + 0.3 * np.eye(len(problem.start))[0])
+    solution = wb.solve(problem, wb.methods.CCD(restarts=0))
+    assert not solution.solved
+    assert "this method leaves out Balance (by default): Balance (by default) is missed by" in solution.message
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -18,6 +18,9 @@ from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import at_speeds, shortened
+
+CONTACTS = "contacts"
+"""Name of what keeps pairs apart, among what a method leaves out."""
 
 TOLERANCE = Range(1e-10, 0.1)
 """Metres and radians to which goals are met: smaller ones are below rounding, larger ones are meaningless."""
@@ -108,6 +111,9 @@ class Tracker(Protocol):
 class Method(Protocol):
     """An algorithm that solves problems.
 
+    One that does not look at all of a problem has `leaves_out(problem)` too, names of what it leaves to the assessment,
+    which is said before it begins.
+
     Examples:
         examples/own_method.py is a whole method in forty lines; an object or "module:Class" names it.
 
@@ -167,6 +173,19 @@ def named_terms(problem: Problem) -> list[tuple[str, object]]:
         for group, terms in groups
         for number, term in enumerate(terms)
     ]
+
+
+def unseen(problem: Problem, takes: Callable[[object], bool], *, contacts: bool = False) -> tuple[str, ...]:
+    """Names of what a method does not look at: contacts, where there can be some, and defaults it does not take."""
+    named = zip(problem.constraint_names, problem.constraints, strict=True)
+    defaults = [name for name, term in named if term in problem.defaults and not takes(term)]
+    return (*([CONTACTS] if contacts and len(problem.clearances) else []), *defaults)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names as words: "contacts, Balance (by default) and ReachCones (by default)"."""
+    *before, last = names
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 class FrameStep(NamedTuple):

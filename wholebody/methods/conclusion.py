@@ -16,13 +16,23 @@ import numpy as np
 from wholebody.assessment.posture import Assessment, judged
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State
-from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker, UnsupportedTermError, check_problem
+from wholebody.methods.base import (
+    CONTACTS,
+    TOLERANCE,
+    FrameStep,
+    SolvingTracker,
+    UnsupportedTermError,
+    check_problem,
+    listed,
+)
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import LONGEST, Control, Progress, errors_left
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution, Status, TraceEntry
 from wholebody.tasks.balance import Balance
+
+PAIR = "the clearance of a pair"  # in messages
 
 
 class Ending(NamedTuple):
@@ -35,7 +45,7 @@ class Ending(NamedTuple):
     how: str  # text after "solved" in the message
     unit: str = "iterations"  # name of what a method that did not converge ran out of
     failure: str = ""  # why the method could not continue, in words; "" if it could
-    caveat: str = ""  # text of the message if something is violated that the method does not see
+    left_out: tuple[str, ...] = ()  # names of what the method does not look at, see `Descends.leaves_out`
     remark: str = ""  # text at the end of every message
     # contradictions of the problem that the search found; None if it did not look for any
     contradictions: tuple[Contradiction, ...] | None = None
@@ -70,8 +80,9 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
     else:
         holds = judgement.holds(enough)
         status, why = proven(status, ending.contradictions, holds), in_words(ending.contradictions)
-    if why and ending.caveat and not judgement.holds(enough):
-        why += f"; {ending.caveat}"
+    caveat = f"this method leaves out {listed(ending.left_out)}" if ending.left_out else ""
+    if why and caveat and not judgement.holds(enough):
+        why += f"; {caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
     note = f"; {problem.left_out}" if problem.left_out else ""
     blocked = "" if status == "solved" else judgement.in_the_way
@@ -102,10 +113,10 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
         return f"{ending.unreached}: nothing is violated, {left}"
     if judgement.holds(enough):
         return f"ran out of {ending.unit}: {left}"
-    name, missed, seen = _worst(problem, judgement, ending.q)
+    name, missed = _worst(problem, judgement, ending.q)
     why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
-    if ending.caveat and not seen:
-        why = ending.caveat
+    if (CONTACTS if name == PAIR else name) in ending.left_out:
+        why = f"this method leaves out {listed(ending.left_out)}"
     return f"{why}: {name} is missed by {missed:.3g} m or rad"
 
 
@@ -130,17 +141,19 @@ def _way_out(problem: Problem, judgement: Assessment) -> str:
     return ""
 
 
-def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float, bool]:
-    """The most violated constraint, its violation, and whether a method that sees what is stated alone sees it."""
-    clearance = max(judgement.clearance_violation, judgement.penetration)
-    parts = ("the clearance of a pair", clearance, False), ("a joint limit", judgement.limit_violation, True)
+def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float]:
+    """The most violated constraint, and its violation."""
+    parts = (
+        (PAIR, max(judgement.clearance_violation, judgement.penetration)),
+        ("a joint limit", judgement.limit_violation),
+    )
     worst = max(parts, key=lambda item: item[1])
     state = State(problem.scene.model).update(q)
     for name, term in zip(problem.constraint_names, problem.constraints, strict=True):
         value = np.atleast_1d(term.value(state))
         missed = float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0))
         if missed > worst[1]:
-            worst = (name, missed, term not in problem.defaults)
+            worst = (name, missed)
     return worst
 
 
@@ -174,6 +187,17 @@ class Descends(ABC):
         """Raise an `UnsupportedTermError` that lists the terms that this method cannot take; there are none here."""
         return
 
+    def leaves_out(self, problem: Problem) -> tuple[str, ...]:
+        """Names of what this method does not look at, which the assessment alone judges; known without a search.
+
+        `wb.solve`, drags, paths, live pages and reach maps warn of it before they begin.
+        """
+        return self._unseen(check_problem(problem, f"{type(self).__name__}.leaves_out: problem"))
+
+    def _unseen(self, problem: Problem) -> tuple[str, ...]:
+        """See `leaves_out`; nothing here."""
+        return ()
+
     @abstractmethod
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """Search from the problem's start in a workspace on its scene."""
@@ -192,6 +216,7 @@ class Descends(ABC):
         check_problem(problem, f"{type(self).__name__}.solve: problem")
         with Control(self.time_limit, progress, self.longest) as control, problem.borrow() as workspace:
             ending = self._descend(problem, workspace, control)
+        ending = with_values(ending, left_out=self._unseen(problem))
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:

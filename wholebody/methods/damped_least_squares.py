@@ -15,7 +15,15 @@ from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
-from wholebody.methods.base import DAMPING, Iterations, TimeLimit, Tolerance, UnsupportedTermError
+from wholebody.methods.base import (
+    DAMPING,
+    Iterations,
+    TimeLimit,
+    Tolerance,
+    UnsupportedTermError,
+    named_terms,
+    unseen,
+)
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import Control
 from wholebody.methods.differential import Iteration, Settings, StepError
@@ -68,6 +76,11 @@ class DampedLeastSquares(Checked, Descends):
         if refused:
             raise UnsupportedTermError(self.name, refused)
 
+    def _unseen(self, problem: Problem) -> tuple[str, ...]:
+        """See `Descends._unseen`: contacts, what people have by default, and stated measures."""
+        measures = [where for where, _ in named_terms(problem) if where.startswith("measures")]
+        return (*unseen(problem, lambda term: False, contacts=True), *measures)
+
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`; contacts are ignored."""
         self._check_terms(problem)
@@ -77,7 +90,6 @@ class DampedLeastSquares(Checked, Descends):
         return Ending(
             descent.q, descent.met or descent.converged, descent.steps, tuple(descent.trace),
             f"in {descent.steps} steps", unit="steps",
-            caveat="this method sees neither contacts nor what people have by default",
         )  # fmt: skip
 
 

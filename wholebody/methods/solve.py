@@ -16,7 +16,7 @@ import numpy as np
 from wholebody.base.checks import function, shown
 from wholebody.base.errors import InputError, UnknownNameError, one_line
 from wholebody.methods import METHODS
-from wholebody.methods.base import Method, check_problem
+from wholebody.methods.base import Method, check_problem, listed
 from wholebody.methods.control import Progress
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -74,6 +74,15 @@ def method_for_motions(given: object) -> Method:
     return made
 
 
+def warn_of_left_out(method: Method, problem: Problem, level: int) -> Method:
+    """Say before anything is computed what a method does not look at; `level` as in `warnings.warn`, of the caller."""
+    names = method.leaves_out(problem) if hasattr(method, "leaves_out") else ()
+    if names:
+        said = f"method {method.name!r} leaves out {listed(names)}, which the assessment alone judges; use method='qp'"
+        warnings.warn(said, stacklevel=level + 1)
+    return method
+
+
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:
     """Find a posture that solves a problem.
 
@@ -99,7 +108,8 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
         'solved'
     """
     check_problem(problem, "solve: problem")
-    solution = as_method(method).solve(problem, function(progress, "progress"))
+    progress = function(progress, "progress")
+    solution = warn_of_left_out(as_method(method), problem, 2).solve(problem, progress)
     _warn_if_nothing_holds(problem, solution)
     return solution
 

@@ -15,7 +15,7 @@ from wholebody.base.batches import JobOptions, Jobs, fingerprint, run_batch, sha
 from wholebody.base.runner import EndedError, Job
 from wholebody.methods.base import Method, check_problem
 from wholebody.methods.control import ctrl_c_ends_all
-from wholebody.methods.solve import as_method
+from wholebody.methods.solve import as_method, warn_of_left_out
 from wholebody.problem import Problem
 from wholebody.studies.neighbours import Family, Work, lower, name_changes, solve_from_neighbours
 from wholebody.studies.records import ENDED, KeptRecords, Records, SolveRecord
@@ -129,6 +129,8 @@ def solve_many(
     what = "solve_many"
     named = _named(problems, what)
     running = Running.checked(what, method, seconds, jobs=jobs, cluster=cluster, progress=progress)
+    for _, problem in named[:1]:
+        warn_of_left_out(running.method, problem, 2)
     warm_start = checks.flag(warm_start, f"{what}: warm_start")
     store = None if folder is None else KeptRecords(checks.path(folder, f"{what}: folder"))
     cases = []

@@ -20,7 +20,7 @@ from wholebody.methods.base import Method, check_problem
 from wholebody.methods.contradictions import contradictions
 from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification import beyond_reach
-from wholebody.methods.solve import as_method
+from wholebody.methods.solve import as_method, warn_of_left_out
 from wholebody.problem import Problem
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
 from wholebody.tasks import Point, inputs
@@ -175,7 +175,7 @@ def reach_map(
         whole: Method = QP(measures=False)
         quick: Method = QP(measures=False, restarts=0, budget=0, iterations=30)  # from a neighbour's posture
     else:
-        whole = quick = as_method(method)
+        whole = quick = warn_of_left_out(as_method(method), problem, 2)
     checks.keywords(running, JobOptions, what)
     asked = Asked(problem, frame, point, whole, quick)
     search = _Search(asked, grid, Jobs.checked(what, **running))

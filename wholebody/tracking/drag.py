@@ -18,7 +18,7 @@ from wholebody.methods.control import BUDGET, budget_for_sweep, within_budget
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_system import AssemblySolution
 from wholebody.methods.newton.settings import FRAMES
-from wholebody.methods.solve import method_for_motions
+from wholebody.methods.solve import method_for_motions, warn_of_left_out
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
@@ -92,7 +92,7 @@ class ProblemDrag:
 
     def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float, budget: float) -> None:
         self.problem, self.dt = copied(problem), time_step(dt, "dt")
-        self.method = method_for_motions(method)
+        self.method = warn_of_left_out(method_for_motions(method), self.problem, 3)
         self.tracker = self.method.tracker(self.problem, self.dt)
         self.workspace = self.tracker.workspace
         self._alone = OneAtATime("drag")

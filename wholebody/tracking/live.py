@@ -17,7 +17,7 @@ from wholebody.geometry.proximity import Contacts
 from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.solve import method_for_motions
+from wholebody.methods.solve import method_for_motions, warn_of_left_out
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tracking.drag import Drag, DragFrame
@@ -165,6 +165,8 @@ class LiveDrag:
         if isinstance(self.problem, Assembly) and method != "newton":
             raise InputError(f"an assembly is dragged by Newton steps, not by {shown(method)}; leave method out")
         self.method: Method = method_for_motions(method)
+        if isinstance(self.problem, Problem):
+            warn_of_left_out(self.method, self.problem, 2)
         self.chosen = str(getattr(method, "name", method))
         self.methods.setdefault(self.chosen, method)
         self._rehearse()

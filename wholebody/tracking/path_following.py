@@ -17,7 +17,7 @@ from wholebody.base.files import read_text
 from wholebody.methods.base import Method, check_problem
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_system import AssemblySolution
-from wholebody.methods.solve import method_for_motions
+from wholebody.methods.solve import method_for_motions, warn_of_left_out
 from wholebody.motion.clip import MOST_FRAMES
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -79,7 +79,7 @@ def follow_path(
     if not isinstance(term, Point):
         raise InputError(f"follow_path moves a Point, and goals[{goal}] is a {type(term).__name__}; use Drag")
     own, q, found = copied(problem), problem.scene.figure.clamp(problem.start), list[Solution]()
-    tracker = method_for_motions(method).tracker(own, FRAME)
+    tracker = warn_of_left_out(method_for_motions(method), own, 2).tracker(own, FRAME)
     for place in places:
         retarget(own, goal, place)
         found.append(warm_started(own, tracker, q) if found else tracker.solve(q))

@@ -15,10 +15,10 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
-from wholebody.methods.base import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit
+from wholebody.methods.base import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit, unseen
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
-from wholebody.methods.ccd.terms import Request, read
+from wholebody.methods.ccd.terms import BY_DEFAULT, Request, read
 from wholebody.methods.conclusion import Descends, DescentTracker, Ending
 from wholebody.methods.contradictions import NEAREST, contradictions, least_left
 from wholebody.methods.control import Control
@@ -91,6 +91,10 @@ class CCD(Checked, Descends):
 
     def _check_terms(self, problem: Problem) -> None:
         read(problem)
+
+    def _unseen(self, problem: Problem) -> tuple[str, ...]:
+        """See `Descends._unseen`: the balance that people keep by default."""
+        return unseen(problem, lambda term: isinstance(term, BY_DEFAULT))
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

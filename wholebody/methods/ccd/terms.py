@@ -21,6 +21,9 @@ from wholebody.tasks.frame import Frame, Hold, Orientation, Relative
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
+BY_DEFAULT = ReachCones, RangeOfMotion
+"""What it keeps of what people have by default."""
+
 
 @dataclass(frozen=True)
 class GoalPlace:
@@ -113,7 +116,7 @@ class _Reader:
     def constraints(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of the reach cones and of the ranges of motion; call `goals` first."""
         problem, cones, ranges = self._problem, dict[str, None](), dict[str, None]()
-        left_out = {id(term) for term in problem.defaults if not isinstance(term, (ReachCones, RangeOfMotion))}
+        left_out = {id(term) for term in problem.defaults if not isinstance(term, BY_DEFAULT)}
         for number, term in enumerate(problem.constraints):
             where = f"constraints[{number}], {type(term).__name__}"
             if id(term) in left_out:

@@ -68,6 +68,13 @@ class Newton(Settings, Descends):
         with problem.borrow() as workspace:
             state_equations(problem, workspace.state)
 
+    def _unseen(self, problem: Problem) -> tuple[str, ...]:
+        """See `Descends._unseen`: stated measures that depend on what is no revolute joint."""
+        if not problem.measures_given:
+            return ()
+        with problem.borrow() as workspace:
+            return tuple(FigureSystem(problem, workspace, self.algebra).objective.reported)
+
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""
         active_system = FigureSystem(problem, workspace, self.algebra)

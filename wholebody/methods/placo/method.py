@@ -11,7 +11,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
 from wholebody.geometry.flesh import settled
-from wholebody.methods.base import Iterations, TimeLimit, Tolerance, check_problem
+from wholebody.methods.base import Iterations, TimeLimit, Tolerance, check_problem, unseen
 from wholebody.methods.conclusion import Descends, Ending
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError, held
@@ -19,6 +19,7 @@ from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check_terms, named_frames
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.balance import Balance
 
 STEP = 0.1  # rad, m: largest motion of a joint or the root in one iteration; half of it takes a quarter longer
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
@@ -64,6 +65,10 @@ class Placo(Checked, Descends):
 
     def _check_terms(self, problem: Problem) -> None:
         check_terms(problem)
+
+    def _unseen(self, problem: Problem) -> tuple[str, ...]:
+        """See `Descends._unseen`: reach cones and ranges of motion, which people have by default."""
+        return unseen(problem, lambda term: isinstance(term, Balance))
 
     def prepare(self, problem: Problem) -> None:
         """Build placo's robot for a problem; `solve` does it if this was not called."""

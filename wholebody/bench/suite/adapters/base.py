@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.errors import InputError
-from wholebody.methods.base import Method, SolvesAnew, UnsupportedTermError, named_terms, refusal
+from wholebody.methods.base import Method, SolvesAnew, UnsupportedTermError, named_terms, refusal, unseen
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
 from wholebody.problem import Problem
@@ -91,6 +91,7 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[type, ...]]
+    blind: ClassVar[bool] = False  # whether it knows no contacts
     loose: ClassVar[tuple[Budget, ...]] = (*few(5, 10, 20), *LADDER)
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
@@ -114,6 +115,10 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
     def accepts(self, problem: Problem) -> str | None:
         """None where the tool can express all terms; else the sentence that names those that it cannot."""
         return refusal(self.name, self._refused(problem))
+
+    def leaves_out(self, problem: Problem) -> tuple[str, ...]:
+        """Names of what the tool does not look at: what people have by default, and contacts where it knows none."""
+        return unseen(problem, lambda term: isinstance(term, self.kinds), contacts=self.blind)
 
     def _refused(self, problem: Problem) -> list[str]:
         several = problem.scene.figure.root == "several"
@@ -154,6 +159,7 @@ class OneCall(Outside[Built], ABC):
             q = figure.clamp(problem.start if q is None else q)
             control.tell(entry)
         ending = Ending(q, True, 1, (entry,), self.way, "time", "" if met else self.failure)
+        ending = with_values(ending, left_out=self.leaves_out(problem))
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
 

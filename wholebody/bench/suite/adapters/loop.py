@@ -81,6 +81,7 @@ class Loop(Outside[Stepper], ABC):
             run.go()
         failure = f"{self.name} gave up at step {run.steps} ({run.failure})" if run.failure else ""
         ending = Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
+        ending = with_values(ending, left_out=self.leaves_out(problem))
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control)
 
     def _room(self, problem: Problem) -> float:

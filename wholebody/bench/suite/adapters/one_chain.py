@@ -54,6 +54,7 @@ class OneChain(OneCall[Chain], ABC):
 
     loose = tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
     kinds = (wb.tasks.Displacement, wb.Effort, wb.Frame)
+    blind = True
 
     @abstractmethod
     def values(self, chain: Chain, start: Array, target: pin.SE3) -> Any:
