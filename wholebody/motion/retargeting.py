@@ -163,7 +163,7 @@ def retarget(
         warn(f"retarget: {motion.name}: {lost}, which it lets go of there; things keep their places and sizes")
     if inside:
         warn(f"retarget: {motion.name}: {inside}; wb.check lists all, wb.avoid frees what can be free")
-    if said := said_of(errors_of(motion, clip, roles)):
+    if said := said_of(errors_of(motion, clip, roles, found)):
         warn(f"retarget: {motion.name}: {said}; bone_errors has them frame by frame")
     return clip
 
@@ -314,17 +314,17 @@ def bone_errors(
         raise InputError(
             f"bone_errors: the clip has {len(clip)} frames and the motion {len(motion)}; give its own clip"
         )
-    return errors_of(motion, clip, matched(motion, clip.figure, names))
+    roles = matched(motion, clip.figure, names)
+    return errors_of(motion, clip, roles, find_ground(motion, {"skeleton": roles.joints}))
 
 
-def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Array]:
-    """`bone_errors` with known roles."""
+def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles, ground: Ground) -> dict[str, Array]:
+    """`bone_errors` with known roles and ground, which says where soles are flat."""
     points = roles.places(clip.figure)
     places = dict(zip(points, point_paths(clip.figure, clip.q, list(points.values())).swapaxes(0, 1), strict=True))
     centres = {role: motion.positions[:, motion.names.index(joint)] for role, joint in roles.joints.items()}
     if clip.figure.root == "free":
-        named = {"skeleton": roles.joints}
-        known = soles(motion, roles, find_ground(motion, named).rests, standing_places(clip.figure, roles)[0])
+        known = soles(motion, roles, ground.rests, standing_places(clip.figure, roles)[0])
         centres |= soled(motion, {role: motion.names.index(name) for role, name in roles.joints.items()}, known)
     found = {}
     for ends in (ends for side in ("left", "right") for limb in LIMBS for ends in known_bones(limb, side, places)):

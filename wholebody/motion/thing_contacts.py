@@ -121,6 +121,16 @@ class Things:
         """Shapes of a thing where they are in a frame."""
         return [(shape, self.at(name, frame) * local) for shape, local, _ in self._pieces[name]]
 
+    def within(self, name: str, path: Array) -> Array:
+        """A point's path (n, 3) in a thing's axes."""
+        return np.array([self.at(name, frame).actInv(place) for frame, place in enumerate(path)])
+
+    def touched(self, name: str, path: Array, most: float, dt: float) -> Mask:
+        """(n,) when a point of path (n, 3) goes with a thing, at `most` metres from it where that begins."""
+        local = self.within(name, path)
+        away = np.array([nearest(self._pieces[name], place, GOES_ON * most)[0] for place in local])
+        return long_runs(near_and_slow(local, away, most, dt), max(1, round(RestLimits().least / dt)))
+
     def contacts(self, motion: SkeletonMotion, joints: Mapping[str, str]) -> list[ThingContact]:
         """What the skeleton touches; `joints` are those of roles."""
         found = []
@@ -134,11 +144,7 @@ class Things:
             shares = SHARES if wrist != joint else SHARES[:1]
             free: Mask = np.ones(len(motion), dtype=bool)
             for name, pieces in self._pieces.items():
-                at = [self.at(name, frame) for frame in range(len(motion))]
-                local = [
-                    np.array([here.actInv(one) for here, one in zip(at, start + share * (path - start), strict=True)])
-                    for share in shares
-                ]
+                local = [self.within(name, start + share * (path - start)) for share in shares]
                 away = [np.array([nearest(pieces, one, GOES_ON * NEAR[part])[0] for one in each]) for each in local]
                 touches = zip(local, away, strict=True)
                 mask = np.any([near_and_slow(*each, NEAR[part], motion.dt) for each in touches], axis=0) & free

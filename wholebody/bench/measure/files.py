@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.bench.suite.adapters.mink import Order
@@ -32,8 +32,10 @@ from wholebody.motion.retargeting import errors_of
 from wholebody.motion.roles import ROWS, Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import point_paths
-from wholebody.motion.standing_ground import ground
+from wholebody.motion.standing_ground import ground_on
 from wholebody.motion.structure import LIMBS, upright
+from wholebody.motion.surfaces import surface_of
+from wholebody.motion.thing_contacts import NEAR, Things
 
 ABOUT = """\
 Recordings retargeted by `wb.retarget` on the ground that it finds, and by mink frame by frame with the stages, \
@@ -115,6 +117,8 @@ def _read(path: Path, kind: tuple[str, ...], human: wb.Figure, frames: int) -> d
 
 
 TOOLS = ("wholebody", "mink, GMR's weights")
+# m: as far from a moving thing are joints of parts that go with it
+CARRIED = {"ankle": 0.15, "toe": 0.1, **NEAR}
 
 
 def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator[Row]:
@@ -149,27 +153,49 @@ def _followed(tool: str, motion: SkeletonMotion, figure: wb.Figure, roles: Roles
     return Clip(figure, np.array([follower.frame(k) for k in range(len(motion))]), motion.dt, motion.name)
 
 
-def judged(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Figure]:
-    """Figures of a clip that follows a recording: findings of `wb.check` on a floor, bones, slides, jerk."""
-    found = check(clip, wb.Scene(clip.figure).add(wb.HalfSpace(), name="floor"))
-    errors = np.degrees(np.concatenate(list(errors_of(motion, clip, roles).values())))
-    shared, points = list(roles.frames), roles.places(clip.figure)
-    ours = point_paths(clip.figure, clip.q, list(points.values()))
-    theirs = motion.positions[:, [motion.names.index(roles.joints[role]) for role in shared]]
-    rests = ground(motion, {"skeleton": roles.joints}).rests
-    slides = [
-        np.linalg.norm(np.diff(ours[:, shared.index(role)], axis=0), axis=1)[mask[1:] & mask[:-1]] / clip.dt
-        for role, mask in rests.items()
-        if role in shared and role.endswith(("ankle", "toe"))
-    ]
-    slide = np.concatenate([*slides, np.zeros(0)])
+def judged(
+    motion: SkeletonMotion,
+    clip: Clip,
+    roles: Roles,
+    scene: wb.Scene | None = None,
+    things: Mapping[str, Array] | None = None,
+) -> dict[str, Figure]:
+    """Figures of a clip that follows a recording among a scene's things; `things` (n, 7) has where they were in it.
+
+    Without a scene it is a floor.
+    """
+    world = wb.Scene(clip.figure).add(wb.HalfSpace(), name="floor") if scene is None else scene
+    found, recorded = check(clip, world), things or {}
+    known = ground_on(motion, {"skeleton": roles.joints}, None if scene is None else surface_of(scene, recorded))
+    errors = np.degrees(np.concatenate(list(errors_of(motion, clip, roles, known).values())))
+    places = roles.places(clip.figure)
+    ours = dict(zip(places, point_paths(clip.figure, clip.q, list(places.values())).swapaxes(0, 1), strict=True))
+    theirs = {role: motion.positions[:, motion.names.index(roles.joints[role])] for role in places}
+    slides, free = [np.zeros(0)], {role: np.ones(len(clip), dtype=bool) for role in places}
+    for name in recorded:
+        moving, moved = (Things(world, {name: tracks[name]}) for tracks in (recorded, clip.things))
+        for role, path in theirs.items():
+            if role.split("_")[-1] in CARRIED:
+                mask = moving.touched(name, path, CARRIED[role.split("_")[-1]], motion.dt) & free[role]
+                slides.append(_slid(moved.within(name, ours[role]), mask, clip.dt))
+                free[role] &= ~mask
+    for role, mask in known.rests.items():
+        if role in ours and role.endswith(("ankle", "toe")):
+            slides.append(_slid(ours[role], mask & free[role], clip.dt))
+    slide = np.concatenate(slides)
+    own, other = (np.stack(list(paths.values()), axis=1) for paths in (ours, theirs))
     return {
         "bones median deg": float(np.median(errors)),
         "frames that overlap": f"{found.colliding} of {len(clip)}",
         "deepest mm": 1e3 * max(found.deepest, found.deepest_between),
         "slide mm/s": 1e3 * float(slide.mean()) if len(slide) else float("nan"),
-        "jerk": _jerk(ours) / max(_jerk(theirs) * _size(ours) / max(_size(theirs), 1e-9), 1e-9),
+        "jerk": _jerk(own) / max(_jerk(other) * _size(own) / max(_size(other), 1e-9), 1e-9),
     }
+
+
+def _slid(path: Array, mask: Mask, dt: float) -> Array:
+    """Speeds of a point (n, 3) from one frame in which it rests (n,) to the next, m/s."""
+    return np.asarray(np.linalg.norm(np.diff(path, axis=0), axis=1)[mask[1:] & mask[:-1]] / dt)
 
 
 def _jerk(places: Array) -> float:
