@@ -22,9 +22,6 @@ from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-STAYED = 0.01  # rad, m: by which a descent moves less from a minimum
-SETTLING = 10  # most descents from the end of one; of arms of seven joints more than three are rare
-
 
 @dataclass(frozen=True)
 class Solutions(Sequence[Solution]):
@@ -149,9 +146,9 @@ def _method(time_limit: float | None, ends: float) -> QP:
 
 def _settled(problem: Problem, answer: Solution, time_limit: float | None, ends: float) -> Solution:
     """The end of descents from an answer and from their ends in turn, until one stays where it begins."""
-    for _ in range(SETTLING):
+    for _ in range(10):  # of arms of seven joints more than three are rare
         after = next(_method(time_limit, ends).minima(problem, [answer.q]))
-        if not after.solved or _difference(problem.scene.model, after.q, answer.q) < STAYED:
+        if not after.solved or _difference(problem.scene.model, after.q, answer.q) < 0.01:  # rad, m
             break
         answer = after
     return answer
