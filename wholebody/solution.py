@@ -10,8 +10,6 @@ from wholebody.assessment.posture import Assessment
 from wholebody.base.arrays import Array, brief
 from wholebody.base.charts import Shown, new_chart
 
-SMALLEST = 1e-9  # m or rad: what is drawn of a zero on a logarithmic axis
-FEW = 60  # entries that a chart joins by lines
 Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 
@@ -81,9 +79,9 @@ class Solution(Shown):
         missed, cost = axes[0]
         numbers = range(1, len(self.trace) + 1)
         # a search jumps from descent to descent; lines would hide where each of them leads
-        look = {"marker": "."} if len(self.trace) <= FEW else {"marker": ".", "markersize": 2, "linestyle": "none"}
+        look = {"marker": "."} if len(self.trace) <= 60 else {"marker": ".", "markersize": 2, "linestyle": "none"}
         for name, word in (("goal_error", "goal error"), ("violation", "violation")):
-            values = [max(getattr(entry, name), SMALLEST) for entry in self.trace]
+            values = [max(getattr(entry, name), 1e-9) for entry in self.trace]  # for a zero on a logarithmic axis
             missed.semilogy(numbers, values, label=word, **look)
         cost.plot(numbers, [entry.measure for entry in self.trace], color="C2", label="measures", **look)
         missed.set_ylabel("largest error [m, rad]")

@@ -29,9 +29,6 @@ from wholebody.tasks.checks import values_and_rows
 from wholebody.tasks.inputs import WORLD, Place
 from wholebody.tasks.point import Point
 
-STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
-NAMED = 4  # most blockers that a message names
-
 
 @dataclass(frozen=True)
 class Assessment:
@@ -115,9 +112,10 @@ class Assessment:
     def in_the_way(self) -> str:
         """The strongest blockers in words, to append to a sentence; empty if goals are met and everything holds."""
         if not self.blockers:
-            stretched = not self.met(MET) and self.optimality <= STILL
+            # a posture this near to first-order optimal [rad, m] counts as the nearest to goals that it misses
+            stretched = not self.met(MET) and self.optimality <= 1e-2
             return "; nothing pushes back: the limbs do not reach" if stretched else ""
-        names = [str(blocker) for blocker in self.blockers[:NAMED]]
+        names = [str(blocker) for blocker in self.blockers[:4]]
         more = len(self.blockers) - len(names)
         return f"; in the way: {', '.join(names)}" + (f" and {more} more" if more else "")
 
@@ -212,7 +210,6 @@ def _values(term: Goal | Constraint, evaluate: Callable[[State], Array], state: 
     return values_and_rows(term, evaluate, state)[0] if is_own(term) else evaluate(state)
 
 
-TOGETHER = 50_000  # bounds of pairs that are looked at together: more take more memory than the processor keeps near
 _UNTURNED, _UNMOVED = np.eye(3), np.zeros(3)
 
 
@@ -263,7 +260,8 @@ def judged_postures(problem: Problem, numbers: Numbers, q: Array) -> Judged:
     """Judge postures q (k, nq) of one problem without constraints and bounds, each with its own numbers."""
     model, built, figure = problem.scene.model, problem.scene.built, problem.scene.figure
     with all_pairs(built).borrow() as pairs:
-        step = max(1, TOGETHER // max(1, len(built.table.pairs)))
+        # more bounds of pairs at once take more memory than the processor keeps near
+        step = max(1, 50_000 // max(1, len(built.table.pairs)))
         parts = [pairs.shortfalls(q[k : k + step], numbers.clearances[k : k + step]) for k in range(0, len(q), step)]
     joints, penetration, short = (np.concatenate(each) for each in zip(*parts, strict=True))
     far, turned = np.zeros((2, 1 + len(problem.goals), len(q)))

@@ -28,7 +28,6 @@ _T = TypeVar("_T")
 DOUBLE = np.dtype(np.float64)
 NUMERIC = "fiu"  # kinds of numpy arrays that hold real numbers: floating, signed and unsigned
 
-FAR = 1e15  # values beyond this get no hint at a wrong unit
 SLIPS = {"m": {"millimetres": 1e-3, "centimetres": 1e-2}, "rad": {"degrees": math.pi / 180.0}, "kg": {"grams": 1e-3}}
 """Unit -> the units that people write by mistake, with their size in it."""
 
@@ -124,7 +123,7 @@ def unit_hint(value: float, low: float, high: float, unit: str) -> str:
     fits = [
         f"{value * factor:.6g} if it is in {other}"
         for other, factor in SLIPS.get(unit, {}).items()
-        if abs(value) < FAR and low <= value * factor <= high  # a large int times a float overflows
+        if abs(value) < 1e15 and low <= value * factor <= high  # a large int times a float overflows
     ]
     return f"; write {' or '.join(fits)}" if fits else ""
 

@@ -7,7 +7,6 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 
-SWEEPS = 30  # over all rows in one projection, at most
 LEAST = 1e-9  # of the square of a row that moves anything, and m or rad by which a row is violated
 
 
@@ -153,7 +152,7 @@ def project(rows: Array, room: Array, low: Array, high: Array, gone: Array) -> N
         for k in range(size):
             square[r] += rows[r, k] * rows[r, k]
             left[r] -= rows[r, k] * gone[k]  # the room is that at the displacement so far
-    for _ in range(SWEEPS):
+    for _ in range(30):  # over all rows, at most
         changed = False
         for r in range(count):
             if square[r] < LEAST:

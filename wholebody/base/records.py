@@ -17,7 +17,6 @@ from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import LARGEST, make_folder
 
 T = TypeVar("T")
-VERSION = "1.0"
 NO_HEAD = "its first line is not the head of a run"
 
 
@@ -41,7 +40,7 @@ class RecordFile(Generic[T]):
             raise InputError(f"{path} is no file; give another folder")
         self.path, self._make, self._read = path, make, 0
         self.kept: dict[str, T] = {}
-        self._head = {"content": content, "version": VERSION, "code": source_digest(), **(settings or {})}
+        self._head = {"content": content, "version": "1.0", "code": source_digest(), **(settings or {})}
         with self._opened():
             pass
 

@@ -35,8 +35,6 @@ from wholebody.scene.scene import Scene
 BOUNCE = 0.05  # m/s: slower approaches do not bounce
 LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
-STOPS = 12  # steps of a frame that are made again to end at an impact: what is squeezed meets thousands
-FASTEST = 0.5  # m/s, at most
 
 
 class Articulated:
@@ -85,7 +83,8 @@ class Articulated:
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, STOPS, {}, [], []
+        # 12 steps may be made again to end at an impact: what is squeezed meets thousands
+        now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, 12, {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
@@ -117,7 +116,7 @@ class Articulated:
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
-        # an impact with the figure that its program did not foresee ends the step, made again at most `STOPS` times
+        # an impact with the figure that its program did not foresee ends the step, made again at most twelve times
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
         most = time
@@ -283,7 +282,7 @@ class Articulated:
     def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Array, Array]:
         """Keep points apart at the end of a step; impulses (m, 3), and the velocities (3 m,) there."""
         room = points.gap - SKIN  # a step removes a fifth of an overlap
-        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, FASTEST))
+        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, 0.5))  # m/s, at most
         speed = self._relative(points)
         start = np.zeros((len(target), 3))
         if points.bodies and self._engine is not None:

@@ -35,7 +35,6 @@ from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
 
 Gains = float | Mapping[str, float] | None
-RATE = 2500.0  # 1/s^2: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg
 MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
 
 
@@ -212,7 +211,8 @@ class Actuated:
 
     def gains(self, inertia: Array) -> tuple[Array, Array]:
         """K and R (nv,) of freedoms that move inertias (nv,) [kg m2, kg]."""
-        stiffness = RATE * inertia if self.stiffness is None else self._spread(self.stiffness, "Actuated: stiffness")
+        # 1/s²: stiffness over inertia of Schmidl and Lin's spring, 1000 N/m at 0.4 kg
+        stiffness = 2500.0 * inertia if self.stiffness is None else self._spread(self.stiffness, "Actuated: stiffness")
         critical = 2.0 * np.sqrt(stiffness * inertia)
         return stiffness, critical if self.damping is None else self._spread(self.damping, "Actuated: damping")
 

@@ -12,7 +12,6 @@ from wholebody.base.dense_kernel import factorise, gram, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
-ROUNDS = 8  # of 50 steps
 COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
 
 
@@ -284,7 +283,7 @@ def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impu
     own[:, 1:] = own[:, 1:].max(axis=1)[:, None]
     now, dual, share = np.zeros_like(rest), -rest, 1e-3
     best, least = impulse, violation(mobility, speed + mobility @ impulse.ravel(), friction, target, impulse)
-    for _ in range(ROUNDS):
+    for _ in range(8):  # of 50 steps
         weight = share * own.ravel()
         broken, moved = _split(mobility, weight, rest, friction, now, dual, 50)
         off = violation(mobility, speed + mobility @ now, friction, target, now.reshape(-1, 3))

@@ -29,10 +29,7 @@ from wholebody.tracking.live_subjects import LiveProblem, handle_frames, things_
 from wholebody.tracking.overlaps import GIVE_WAY
 
 RATE = 12.0  # 1/s: of the spring between the mouse and a body
-STRONGEST = 80.0  # m/s^2: a body is not drawn faster than this
 FASTEST = 3.0  # m/s: a goal that jumps is followed at this speed
-HELD = 0.25  # s: a goal from outside that is not renewed holds for so long
-BACK = 1.0  # s: then it eases back to where its handle began, in about this time
 
 
 class LiveWorld:
@@ -184,7 +181,7 @@ class LiveWorld:
     def _lost(self, name: str) -> bool:
         """Whether a tracker has not given the place of a handle for so long that it goes back."""
         # the page's thread may have taken it meanwhile
-        return self.world.time - self._renewed.get(name, np.inf) > HELD
+        return self.world.time - self._renewed.get(name, np.inf) > 0.25  # s
 
     def _handle_place(self, q: Array, name: str) -> Array:
         handle = self._subject.handles[name]
@@ -219,7 +216,7 @@ class LiveWorld:
             return
         mean = engine.twist(name)[:3] - 0.5 * dt * np.asarray(engine.gravity)  # velocity of the last frame, as it fell
         drawn = RATE**2 * way - 2.0 * RATE * mean
-        drawn *= min(1.0, STRONGEST / max(float(np.linalg.norm(drawn)), 1e-12))
+        drawn *= min(1.0, 80.0 / max(float(np.linalg.norm(drawn)), 1e-12))  # m/s²: no body is drawn faster
         mass = float(np.linalg.norm(engine.weight(name)) / np.linalg.norm(engine.gravity))
         engine.push(name, dt * (mass * drawn - engine.weight(name)), engine.centre(name))
 
@@ -227,7 +224,7 @@ class LiveWorld:
         """Bring handles back that a tracker has lost."""
         for name in list(self._renewed):
             if self._lost(name):
-                share = min(1.0, self.world.dt / (0.3 * BACK))
+                share = min(1.0, self.world.dt / 0.3)  # it eases back to where its handle began, in about a second
                 self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
 
     def _track(self) -> Array:

@@ -19,7 +19,6 @@ from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, Surface, mass_properties, surface
 from wholebody.scene.scene import Scene
 
-TOGETHER = 40  # points of things that share the program of a figure's contacts; more: exact for more things, slower
 HUMAN = MATERIALS["human"]  # of every figure
 
 
@@ -231,7 +230,7 @@ class ContactPoints(NamedTuple):
             joined = linked.copy()
             joined[self.bodies[found & (self.gap <= touch)]] = True
             joined &= movable
-            if (joined == linked).all() or found.sum() > TOGETHER:
+            if (joined == linked).all() or found.sum() > 40:  # points; more: exact for more things, slower
                 return with_values(self, **{name: part[found] for name, part in self._asdict().items()})
             linked = joined
 

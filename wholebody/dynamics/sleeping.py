@@ -14,11 +14,10 @@ from wholebody.geometry.proximity import Contacts
 
 STILL, AFTER = 5e-3, 0.5  # m/s of every point of a body, and s that an island is so slow before it sleeps
 TOUCHING = 1e-3  # m: nearer bodies wake each other
-MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap at which bodies rest
 
 
 class Sleepers:
-    """Which bodies sleep: together with all that touch each other, until what touches them is elsewhere by `MOVED`."""
+    """Which bodies sleep: together with all that touch each other, until what touches them moves."""
 
     def __init__(self, state: BodiesState, together: Indices) -> None:
         """Let all be awake; `together` (k, 2) are bodies that joints hold together."""
@@ -89,7 +88,7 @@ class Sleepers:
         both = self._touching(near)
         both = np.concatenate([both, both[:, ::-1]])
         both = both[asleep[both[:, 0]] & active[both[:, 1]]]
-        touched: Indices = self._touched[self._moved() > MOVED, 0]
+        touched: Indices = self._touched[self._moved() > 3e-5, 0]  # m: less than the gap at which bodies rest
         if len(both):  # few steps have any, and the search takes longer than all else here
             known = np.isin(self._keys(both), self._keys(self._touched))
             touched = np.concatenate([both[~known | (self._speeds(both) > STILL), 0], touched])

@@ -30,7 +30,6 @@ LEVER = 0.06
 
 ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
 FEET = ("left_sole", "right_sole")
-RAISED = 0.03  # m: a sole higher than this over the lower one bears nothing
 MOST = 3400.0  # N: compression that NIOSH's action limit allows (1981)
 
 
@@ -344,7 +343,8 @@ def static_torques(
     statics = statics_of(Scene(person), Exertion(held, strength=strength, standing=not seated))
     state = State(person.model).update(q)
     low = min((state.frame(one.frame).translation[2] for one in statics.feet), default=0.0)
-    bearing = tuple(one for one in statics.feet if state.frame(one.frame).translation[2] <= low + RAISED)
+    # m: a sole that is higher over the lower one bears nothing
+    bearing = tuple(one for one in statics.feet if state.frame(one.frame).translation[2] <= low + 0.03)
     statics = with_values(statics, feet=bearing)
     legs = person.groups["legs"] if seated else ()
     joints = {name: person.model.joints[person.joint_id(name)] for name in person.joints if name not in legs}

@@ -42,7 +42,6 @@ from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
 NEUTRAL = 5.0  # degrees: up to which a wrist is neutral, a trunk upright, and a head not in extension
-RAISED = 0.03  # m: of a shoulder
 DEVIATED = radians(10.0)  # of a wrist from its middle line
 END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side: "at or near the end of range"
 TURNED = radians(20.0)  # OWAS: of the trunk to any side or about its axis
@@ -363,7 +362,7 @@ def _rula_trunk(angles: BodyAngles, work: Work) -> int:
 def _upper_arm(arm: SideAngles, work: Work) -> int:
     """Score of RULA and REBA: flexion, a raised shoulder, abduction, and what supports it."""
     bent = max(arm.shoulder_flexion, -radians(45.0))  # backward there are two classes
-    score = _grade(abs(bent), 20.0, 45.0, 90.0) + int(arm.shoulder_rise > RAISED)
+    score = _grade(abs(bent), 20.0, 45.0, 90.0) + int(arm.shoulder_rise > 0.03)  # m: a raised shoulder
     return max(score + int(arm.shoulder_abduction > radians(20.0)) - int(work.arms_supported), 1)
 
 

@@ -26,8 +26,6 @@ SETTINGS = {
 
 ADJUSTABLE = "adjustable"  # name of such a figure
 
-COLOR = np.array((0.45, 0.47, 0.50, 1.0))
-
 
 def adjustable(
     parts: Mapping[str, Any],
@@ -84,7 +82,7 @@ def adjustable(
         frame = model.addFrame(pin.Frame(name, last, 0, place, pin.FrameType.BODY))
         for number, part in enumerate(shape.pieces()):
             piece = pin.GeometryObject(f"{name}:{number}", last, frame, place * part.placement, part.geometry)
-            piece.meshColor[:] = COLOR
+            piece.meshColor[:] = (0.45, 0.47, 0.50, 1.0)
             pieces.append(piece)
     description = Description(
         groups={"all": tuple(spans)},

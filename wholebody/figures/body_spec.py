@@ -85,8 +85,6 @@ VIRTUAL_MASS = 1e-6
 """Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
 the next link outwards, so that the total is right."""
 
-SKIN = (0.85, 0.68, 0.55, 1.0)  # colour of the pieces: red, green, blue, opacity
-
 
 def urdf_text(spec: BodySpec, extension: str = "") -> str:
     """Return the URDF of a body: metres, radians (degrees in comments); cylinders tagged as capsules for Pinocchio."""
@@ -224,7 +222,7 @@ def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[
         piece = pin.GeometryObject(
             solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
         )
-        piece.meshColor[:] = SKIN
+        piece.meshColor[:] = (0.85, 0.68, 0.55, 1.0)  # red, green, blue, opacity
         index[solid.name] = geometry.addGeometryObject(piece)
         if solid.flesh:
             mark_flesh(model, geometry, index[solid.name])

@@ -19,7 +19,6 @@ from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model, pairs_of
 from wholebody.geometry.proximity import PairTable, Proximity
 
-TOUCHING = 1e-3  # m: what is mounted and its carrier are not tested against each other where they start this near
 OF_LINK = " (link)"  # after the name of a link, while models are joined
 
 Parts: TypeAlias = tuple[pin.Model, pin.GeometryModel, Description, pin.GeometryModel | None]
@@ -176,7 +175,8 @@ def _pairs_of_mount(
     seat = parts[1].joints[0]
     pairs = _between(parts, 0, 1)
     probe = geometry_model(list(pieces), pairs)
-    near = Proximity(PairTable(model, probe)).query(State(model).update(rest).data, TOUCHING).pair
+    # what starts within 1 mm of its carrier is not tested against it
+    near = Proximity(PairTable(model, probe)).query(State(model).update(rest).data, 1e-3).pair
     touching = {(a, b) for a, b in near.tolist() if joint[a] in (seat, above[seat])}
     why = []
     for a, b in pairs.tolist():

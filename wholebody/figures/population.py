@@ -25,9 +25,6 @@ SEXES = {"male": "men", "female": "women"}
 
 UNITS = {"mass": "kg", "age": "years"}  # units of the dimensions that are not lengths
 
-NEAR = 2.0
-"""Years from an end of the ages. Few were measured nearer to it and nobody beyond it: they have the dimensions of those
-at this distance."""
 
 RARE = 1e-6
 """Share of people by the normal distribution: who differs more from those of the same stature and mass is nobody. Its
@@ -43,7 +40,8 @@ def odds(x: Array, low: Array | float, high: Array | float) -> Array:
 
     Of a value nearer to a finite end than `NEAR`, or beyond it, those of that distance from the end.
     """
-    inner = NEAR * np.isfinite(high)
+    # few were measured within two years of an end of the ages: they have the dimensions of those at this distance
+    inner = 2.0 * np.isfinite(high)
     above = np.clip(x, low + inner, high - inner) - low
     return np.asarray(above / (1.0 - above / (high - low)))
 

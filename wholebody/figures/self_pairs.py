@@ -18,8 +18,6 @@ from wholebody.figures.description import ExcludedPair, limits_of, zero_within_l
 from wholebody.figures.state import State, root_freedoms
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
-SELDOM = 0.02  # share of the sampled postures: pairs that are free in at most this share are left out, as nested shells
-
 UNLIMITED = np.pi
 """Range in both directions for sampling joints without limits: radians, or metres for prismatic joints."""
 
@@ -112,7 +110,7 @@ def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array)
         # metres: pieces nearer than this touch. The phalanges of some hands are never farther apart.
         request.security_margin = 2e-4
     free = dict.fromkeys(range(len(geometry.collisionPairs)), 0)
-    most = int(SELDOM * len(postures))
+    most = int(0.02 * len(postures))  # pairs that are free in so few are left out, as nested shells
     for q in postures:
         pin.updateGeometryPlacements(model, data, geometry, results, q)
         for k in [k for k in free if not pin.computeCollision(geometry, results, k)]:
@@ -128,8 +126,6 @@ APART = 1e-3  # least distance of two pieces in the posture, metres
 
 LONGEST_STEP = 0.25  # largest change of a joint in one correction, radians or metres
 
-DAMPING = 1e-4
-"""Square metres added to the diagonal of the normal equations; larger = shorter steps along singular directions."""
 
 UNPARTED = "overlap at zero, and no posture was found that parts them"
 
@@ -235,7 +231,8 @@ class _Parting:
         for _ in range(self.model.nv):
             part = rows[:, free]
             short = wanted - rows[:, ~free] @ step[~free]
-            step[free] = part.T @ np.linalg.solve(part @ part.T + DAMPING * np.eye(len(part)), short)
+            # 1e-4 m² on the diagonal; larger: shorter steps along singular directions
+            step[free] = part.T @ np.linalg.solve(part @ part.T + 1e-4 * np.eye(len(part)), short)
             beyond = free & ((step < lower - 1e-12) | (step > upper + 1e-12))
             if not beyond.any():
                 break

@@ -24,9 +24,6 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 
 MOST_NEIGHBOURS = 255  # most edges at one vertex that coal can represent
 
-FEW = 1000
-"""Number of points up to which duplicates are dropped before the hull is made; of more points qhull drops them."""
-
 
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
     """Convex hull of points (n, 3), metres, with its origin at the centre of the smallest sphere around it.
@@ -36,7 +33,7 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
     InputError for fewer than four different points, or what is thinner than `SMALLEST` in some direction.
     """
     cloud = check_points(points, what)
-    if len(cloud) < FEW:
+    if len(cloud) < 1000:  # of more points qhull drops duplicates
         cloud = np.unique(cloud, axis=0)
     hull = _solid_hull(cloud, what)
     if vertices is not None and len(hull.vertices) > vertices[0]:

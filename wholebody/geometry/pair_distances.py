@@ -25,7 +25,6 @@ KEPT = 30_000
 20,000 things they would take 3.6 GB, of which hardly any is ever read."""
 
 ROOM = 64  # results that are read at once
-AWAY = 10.0  # m: between pieces that stand anywhere
 FIRST_GUESS = np.array([1.0, 0.0, 0.0, 0.0])  # coal's own for a pair it has not seen: a direction, two vertices zero
 
 
@@ -57,7 +56,7 @@ class PairDistances:
         self._viewed = view is not None
         self.placed: Array = self._copied() if view is None else view
         apart = np.tile(np.eye(4)[:, :3], (geometry.ngeoms, 1, 1))
-        apart[:, 3, 0] = AWAY * np.arange(geometry.ngeoms)
+        apart[:, 3, 0] = 10.0 * np.arange(geometry.ngeoms)  # m: pieces stand anywhere
         self.put(apart)
         for number in computed_first(len(data.distanceResults)):
             pin.computeDistance(geometry, data, number)

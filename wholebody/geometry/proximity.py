@@ -29,9 +29,6 @@ SINGLY = 3000
 Pinocchio 1 ns for each of them, to be called 200 ns for each that is."""
 
 
-FEW = 3  # pairs of a block on average, below which to look at blocks takes longer than to look at all pairs
-
-
 class Contacts(NamedTuple):
     """Pairs nearer than a query distance. All arrays have k rows, and no gaps in memory.
 
@@ -161,7 +158,7 @@ def pair_blocks(model: pin.Model, joint: Indices, pairs: Indices) -> tuple[Indic
     roots, members = np.unique(root[joint[first[stands]]]), np.unique(first[stands])
     last, body = np.where(stands, second, -1), np.where(stands, np.searchsorted(roots, root[joint[first]]), -1)
     begin = np.flatnonzero(np.concatenate([[True], (np.diff(body) != 0) | (np.diff(last) != 0)])[: len(pairs)])
-    if len(pairs) < FEW * len(begin):
+    if len(pairs) < 3 * len(begin):  # looking at so small blocks takes longer than looking at all pairs
         begin = begin[:0]
     members = members[np.argsort(root[joint[members]], kind="stable")]
     ends = np.append(begin, len(pairs)).astype(np.intp)

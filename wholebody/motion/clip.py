@@ -26,9 +26,7 @@ from wholebody.motion.resampling import splined
 ROOT_SIZE = 7  # values of a free root
 LARGEST = 1e6  # of a value, radians or metres
 MOST_FRAMES = 1_000_000  # of a clip: ten hours at 30 frames a second; more would be gigabytes
-DRAWN = 8  # joints of `Clip.plot`
 ROUNDING = 1e-9  # share of a time step by which a time may be outside of a clip: the rounding of sums of steps
-SAME = 0.01  # of a time step: files write 0.0333333 s for a thirtieth, and their last frame is then there too
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +181,8 @@ class Clip(Shown):
             InputError: a time step that is not positive, or so short that there were more than a million frames.
         """
         dt = time_step(dt, f"{self.name}: dt")
-        frames = int(np.floor(self.duration / dt + SAME)) + 1
+        # files write 0.0333333 s for a thirtieth, and their last frame is then there too
+        frames = int(np.floor(self.duration / dt + 0.01)) + 1
         if frames > MOST_FRAMES:
             raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
         places = np.minimum(np.arange(frames) * dt / self.dt, len(self) - 1.0)
@@ -284,7 +283,7 @@ class Clip(Shown):
             reach = {
                 name: float(np.ptp(self.q[:, one.idx_q : one.idx_q + one.nq], axis=0).max()) for name, one in of.items()
             }
-            names = sorted(reach, key=lambda name: -reach[name])[:DRAWN]
+            names = sorted(reach, key=lambda name: -reach[name])[:8]
             names = [name for name in names if reach[name] > 1e-9] or names[:1]
         chart, axes = new_chart(1, 1, (8.0, 3.2))
         for name in names:

@@ -250,9 +250,6 @@ def _pressure(pressed: Array, points: Array) -> Array:
     return np.asarray(pressed @ points / load)
 
 
-TOUCHING = 0.005  # m: the farthest of what touches; retargeted hands are up to 1 mm away, and avoiders keep a clearance
-
-
 def bearing(
     clip: Clip, q: Array, feet: Mapping[str, Mask], scene: Scene | None, friction: float
 ) -> tuple[InverseDynamics, tuple[str, ...], list[Stand]]:
@@ -283,7 +280,8 @@ def touching_parts(clip: Clip, scene: Scene, feet: Collection[str]) -> tuple[tup
         for q, v in zip(clip.q, clip.velocities(), strict=True):
             pin.forwardKinematics(model, data, q, v)
             here = list[tuple[str, Array, Array]]()
-            for first, second, normal, point in _sides(workspace.near(q, TOUCHING)):
+            # 5 mm, as retargeted hands are up to 1 mm away, and avoiders keep a clearance
+            for first, second, normal, point in _sides(workspace.near(q, 0.005)):
                 mine, other = owners[first], owners[second]
                 if mine in bearing and other not in carrier and other not in clip.things:
                     twist = pin.getVelocity(model, data, joints[mine], pin.ReferenceFrame.WORLD)

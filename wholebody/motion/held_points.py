@@ -16,8 +16,6 @@ from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import Ground
 from wholebody.motion.structure import upright
 
-SOLE = 0.002  # m: what is lower than this above a foot's lowest point is its sole
-
 
 @dataclass(frozen=True, eq=False)
 class HeldPoint:
@@ -132,7 +130,7 @@ def _corners(figure: Figure, data: pin.Data, joint: int) -> Array:
 
 def _flat(corners: Array) -> Array:
     """(k, 2) where the lowest of corners are, which are a sole."""
-    return np.asarray(corners[corners[:, 2] <= corners[:, 2].min() + SOLE, :2])
+    return np.asarray(corners[corners[:, 2] <= corners[:, 2].min() + 0.002, :2])  # m
 
 
 def _length(motion: SkeletonMotion, joints: Mapping[str, str], first: str, last: str) -> float:

@@ -221,9 +221,6 @@ def _deepest_pair(found: ClipCheck, place: int, *, between: bool) -> str:
     return max(found.contacts, key=lambda each: (each.between if between else each.depth)[place]).names
 
 
-JUMP = 0.35  # rad, m: least change of a coordinate from frame to frame that can be a jump
-
-
 def foreseen(terms: FrameTerms, was: ClipCheck, keep_ends: bool) -> str:
     """Sentences with their mends: what is held inside things, jumps that collide, ends that cannot be kept; or ""."""
     return "; ".join(
@@ -278,7 +275,7 @@ def _jumps(was: ClipCheck) -> str:
     around = np.zeros_like(steps)
     around[1:], around[:-1] = steps[:-1], np.maximum(around[:-1], steps[1:])
     # a jump is so many times as long as the steps before and after it
-    jumps = (steps > np.maximum(JUMP, 4.0 * around)) & (was.between > was.tolerance)[:, None]
+    jumps = (steps > np.maximum(0.35, 4.0 * around)) & (was.between > was.tolerance)[:, None]  # rad, m: least
     if not jumps.any():
         return ""
     gap, column = np.unravel_index(int(np.where(jumps, steps, 0.0).argmax()), steps.shape)

@@ -37,7 +37,6 @@ NEAR, DEEP = 0.05, 1e-2  # rad, m: change of a value by a step that may meet oth
 FAR, SHORTER = 0.5, 0.3  # rad, m: change of a value by a step that is looked at; share of it that the next try may take
 PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
-SOFT = 8  # daqp's flag of a row that may be broken at a price
 LEAST_LEVER = 0.1  # m
 WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
@@ -209,7 +208,7 @@ class Fitter:
         among_rows = np.concatenate([cones, among_rows])
         low = np.concatenate([np.minimum(CONE_MARGIN - self._angles[edge], 0.5 * STEP), low])
         sense = np.zeros(len(lower) + len(low), dtype=np.int32)
-        sense[len(lower) :] = SOFT
+        sense[len(lower) :] = 8  # daqp's flag of a row that may be broken at a price
         x, _, flag, _ = daqp.solve(
             hessian, gradient, among_rows, np.concatenate([upper, np.full(len(low), 1e30)]),
             np.concatenate([lower, low]), sense, rho_soft=RELAXED,

@@ -22,9 +22,7 @@ from wholebody.tasks import Hold
 
 PALMS = ("left_palm", "right_palm")
 NEAR = 0.005  # m: a hand that rests on a thing that stands, or in a hand, is no farther from it
-CARRIED = 0.03  # m: nor from what another hand carries; carried boxes are modelled smaller than hands are apart
 INSIDE = 1e-3  # m: a hand that is deeper in what it rests on cannot be held there
-SUNK = 0.02  # m: a hand that is deeper goes through it
 
 
 @dataclass(frozen=True)
@@ -123,7 +121,8 @@ def resting_hands(scene: Scene, q: Array, dt: float, hands: Sequence[str]) -> tu
                 turns = not hand.endswith(PALMS)
                 held[frame].append(Hold(hand, orientation=turns, relative_to=place.base))
             free &= ~rests
-            deep = long_runs((gaps <= place.most) & (gaps >= -SUNK), least) & (gaps < -INSIDE)
+            # a hand that is deeper than 20 mm goes through it
+            deep = long_runs((gaps <= place.most) & (gaps >= -0.02), least) & (gaps < -INSIDE)
             if deep.any():
                 sunk.append(f"{hand} rests up to {-1e3 * gaps[deep].min():.0f} mm inside {place.name}")
     said = f"{', '.join(sunk)}, and is not held there" if sunk else ""
@@ -158,7 +157,8 @@ def _places(scene: Scene, hand: str, hands: Sequence[str], span: Array) -> Itera
             continue
         told = any(joints.get(segment) in own for segment in thing.rests_on)
         if told or any(carrier in other for other in others):
-            yield _Place(name, thing.segment, CARRIED, told, [index for index, _ in scene.built.pieces_of[name]])
+            # 30 mm, as carried boxes are modelled smaller than hands are apart
+            yield _Place(name, thing.segment, 0.03, told, [index for index, _ in scene.built.pieces_of[name]])
     for other in hands[hands.index(hand) + 1 :]:
         if (joint := _joint(scene, other)) not in own:
             yield _Place(other, other, NEAR, False, _pieces(scene, joint))

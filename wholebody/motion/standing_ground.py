@@ -22,11 +22,8 @@ from wholebody.motion.windows import Window, long_runs, runs
 from wholebody.scene.scene import Scene
 
 FEET = ("ankle", "toe")
-OTHERS = ("hand", "wrist", "knee")
 APART, SPREAD = 0.04, 0.06  # m: between two levels of a floor; within one level, by errors of a recording
-GATHERED = 0.8  # share of the time of rests at nearly one height that a level has
 HANGS = 0.15  # m: what seems to rest and has all surfaces so far below it hangs, as legs do of who lies on an edge
-UNDER = -0.4, 0.0, 0.5, 1.0, 1.4  # shares of the way from ankle to toe at which a sole is looked at, from its heel on
 ABOVE = -0.05, 0.2  # m: how high an ankle or toe may be recorded above the surface on which its foot stands
 HEIGHT, MOST_FRAMES = Range(-1e6, 1e6, "m"), 10**9
 
@@ -241,7 +238,7 @@ def ground_on(
         levels = (0.0,) if uneven or not stood else tuple(stood)
         _clear(rests, holds)
     if holds:
-        for role in (f"{side}_{part}" for side in ("left", "right") for part in OTHERS):
+        for role in (f"{side}_{part}" for side in ("left", "right") for part in ("hand", "wrist", "knee")):
             if role in joints and not (role.endswith("wrist") and role.replace("wrist", "hand") in joints):
                 rests[role], more = _others(motion, joints[role], role, holds, above)
                 if surface is not None:
@@ -298,7 +295,8 @@ def _under(motion: SkeletonMotion, joints: Mapping[str, int], each: Foothold, su
     """Heights of surfaces below the sole of a foot that rests; of those in which it is recorded none."""
     ends = [f"{each.role.split('_')[0]}_{part}" for part in FEET]
     ways = [motion.positions[each.first : each.end, joints[role]].mean(axis=0) for role in ends if role in joints]
-    places = [ways[0] + share * (ways[-1] - ways[0]) for share in UNDER] if len(ways) > 1 else ways
+    # a sole is looked at from its heel on, at shares of the way from ankle to toe
+    places = [ways[0] + share * (ways[-1] - ways[0]) for share in (-0.4, 0.0, 0.5, 1.0, 1.4)] if len(ways) > 1 else ways
     top = max(place[2] for place in ways)
     found = [surface(np.array([*place[:2], top])) for place in places]
     return [height for height in found if height is not None]
@@ -316,7 +314,7 @@ def _levelled(heights: Array, counts: Indices) -> tuple[Array, tuple[float, ...]
         inside = [(heights[group] >= low) & (heights[group] <= low + SPREAD) for low in heights[group]]
         densest = max(inside, key=lambda mask: counts[group[mask]].sum())
         gathered = group[densest]
-        if counts[gathered].sum() < GATHERED * counts[group].sum():
+        if counts[gathered].sum() < 0.8 * counts[group].sum():  # of the time of rests at nearly one height
             uneven = True
             continue
         settled[gathered] = np.median(np.repeat(heights[gathered], counts[gathered]))

@@ -24,8 +24,6 @@ LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist", "hand")
 """Ends of the bones of a leg and of an arm, from the trunk outwards."""
 
 PARTS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "head")
-UPRIGHT = 0.5  # of a trunk's length: its shoulders stand as high above its hips at least
-SHORT = 0.01  # of the skeleton's longest way: a bone that is shorter has no direction
 
 
 class _Limb(NamedTuple):
@@ -123,7 +121,8 @@ def _reach(motion: SkeletonMotion, joint: int) -> float:
 
 def _parts(motion: SkeletonMotion, limb: _Limb) -> list[int]:
     """The three ends of the two longest bones, and the next joint that is apart: of a leg one that is not below it."""
-    size, rest = SHORT * longest_way(motion.parents, motion.offsets), motion.rest()
+    # a bone shorter than 1 % of the skeleton's longest way has no direction
+    size, rest = 0.01 * longest_way(motion.parents, motion.offsets), motion.rest()
     first, middle, last = limb.joints[limb.first : limb.first + 3]
     beyond = [k for k in limb.joints[limb.first + 3 :] if np.linalg.norm(rest[k] - rest[last]) > size]
     offsets = rest[beyond] - rest[last]
@@ -284,7 +283,7 @@ def _is_person(joints: Mapping[str, int], places: Mapping[str, Array], walks: bo
     )
     trunk = np.asarray(upper - lower)
     single = [joint for role, joint in joints.items() if not role.endswith("wrist")]
-    return len(set(single)) == len(single) and bool(trunk[2] > UPRIGHT * np.linalg.norm(trunk))
+    return len(set(single)) == len(single) and bool(trunk[2] > 0.5 * np.linalg.norm(trunk))
 
 
 def recognised_unit(parents: Indices, offsets: Array) -> str:

@@ -207,8 +207,6 @@ BODY = {
 """Of parts that hands touch both ends of a bone, and how far a hand that touches them is from it, metres."""
 
 HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
-SLACK = 0.02  # m: farther away than that by more than this nothing is touched: hands that swing past hips do not
-RESTED = 0.2  # s: hands that touch the body for less pass it
 ARM = ("shoulder", "elbow", "wrist", "hand")
 
 
@@ -250,9 +248,10 @@ def own_rests(
             way = place - _on_bone(place, at[start], at[end])
             far = np.linalg.norm(way, axis=1)
             local = np.einsum("nji,nj->ni", turns[start], place - at[start])
-            near = near_and_slow(local, far - reach, SLACK, motion.dt) & free[role] & (far > 1e-3)
+            # what is farther by over 20 mm is not touched: hands swing past hips
+            near = near_and_slow(local, far - reach, 0.02, motion.dt) & free[role] & (far > 1e-3)
             near &= free.get(name, near)
-            for run in runs(long_runs(near, max(1, round(RESTED / motion.dt)))):
+            for run in runs(long_runs(near, max(1, round(0.2 / motion.dt)))):  # s: for less, hands pass it
                 normal = way[(run.first + run.end) // 2]
                 found.append(ThingContact(role, *run, name, np.zeros(3), normal / np.linalg.norm(normal), share))
                 for taken in {role, name} & free.keys():

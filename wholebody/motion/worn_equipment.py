@@ -186,8 +186,6 @@ def _surface(figure: Figure, segment: str, outward: Array, where: str) -> float:
 
 NOTHING = "nothing"  # in place of equipment: nothing is worn
 
-CLOTH = (0.35, 0.38, 0.28, 1.0)
-
 
 def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:
     """A torus about z of convex closed sections: vertices and triangles; radii of its circle and its tube, metres."""
@@ -246,7 +244,9 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
     shape, found = make(), list[Equipment]()
     for side in sides:
         called = name if len(sides) == 1 else f"{side}_pouch"
-        one = Equipment.worn(shape, figure, name=called, to=to, side=side, middle=(sideways, height), color=CLOTH)
+        one = Equipment.worn(
+            shape, figure, name=called, to=to, side=side, middle=(sideways, height), color=(0.35, 0.38, 0.28, 1.0)
+        )
         if isinstance(shape, Sphere):  # half inside
             at = placement(one.at, name)
             one = replace(one, at=at.translation - np.array([0.0, shape.radius, 0.0]))

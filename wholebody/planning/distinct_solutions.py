@@ -23,8 +23,6 @@ from wholebody.methods.starts import all_found, throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-STAYED = 0.01  # rad, m: by which a descent moves less from a minimum
-SETTLING = 10  # most descents from the end of one; of arms of seven joints more than three are rare
 UNCHANGED = 40  # starts in a row that change none of what is returned: by Laplace's rule the next does 1 time in 42
 LONGEST = 60.0  # s of the processor without a time limit: answers of several figures multiply, and so do descents
 
@@ -197,9 +195,9 @@ def _method(time_limit: float | None, ends: float) -> QP:
 
 def _settled(problem: Problem, known: _Known, answer: Solution, time_limit: float | None, ends: float) -> Solution:
     """The end of descents from an answer and from their ends in turn, until one stays where it begins."""
-    for _ in range(SETTLING):
+    for _ in range(10):  # of arms of seven joints more than three are rare
         after = next(_method(time_limit, ends).minima(problem, [answer.q]))
-        if not after.solved or known.difference(after.q, answer.q) < STAYED:
+        if not after.solved or known.difference(after.q, answer.q) < 0.01:  # rad, m
             break
         answer = after
     return answer

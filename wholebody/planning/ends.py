@@ -18,7 +18,6 @@ from wholebody.problem import Problem
 
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each
 ALONG = (0.0, 0.4, 0.7, 0.9)  # of a path: where nearer ends are looked for; more = shorter paths, for a solve each
-SHORTER = 0.98  # of the length to the end before: a motion to a nearer one is at most as long
 
 End = tuple[Array | None, str]  # a posture (nq,) at which a motion may end, None where goals were not met; and why
 
@@ -52,7 +51,8 @@ def nearer(problem: Problem, path: list[Array], local: LocalPlanner, sampler: Sa
         solution = QP(restarts=0, budget=0).solve(bare.with_start(path[place]))
         end = sampler.turned(solution.q, path[place])
         if solution.solved and meets(assess(problem, end), QP().tolerance):
-            way = local.joined(path[place], end, SHORTER * length(model, path[place:]))
+            # m, rad: the motion to a nearer end is shorter
+            way = local.joined(path[place], end, 0.98 * length(model, path[place:]))
             path = [*path[: place + 1], *way] if way else path
     return path
 

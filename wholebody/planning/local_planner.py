@@ -28,20 +28,14 @@ from wholebody.tasks.base import filled
 from wholebody.terms.linearisation import ConstraintValues
 from wholebody.tracking.qp_strategy import Attraction
 
-WITHIN = 0.02  # m: distance within which pairs are looked at; larger = fewer and dearer queries
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 MISSED = 5e-5  # m, rad: by which motions may miss clearances and constraints; a frame may by twice as much
-PARTS = 400  # most of one motion that are tested, as what slides along something else would be halved on and on
-KNOWN = 128  # postures that are remembered, as those of a path are looked at again and again
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
-JUMP = 1.5  # of the distance of two postures: above it their projections are on two sides of something
-LEVER = 0.05  # m: least that a freedom counts as moving a point by, a radian or metre
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 # share of the weight that all but the place of a root has while that is pulled; larger = gets stuck, smaller = ends far
 # from the target
 LOOSE = 0.1
-GAIN = 5e-3  # rad, m: by which a step comes nearer at least; smaller = longer motions along things
 
 
 class Seen(NamedTuple):
@@ -102,7 +96,8 @@ class Geodesics:
         carried = [(a in supports[b], b in supports[a]) for a, b in joints.tolist()]
         # as a piece sees another one that it does not carry, twice as much
         self._views = np.where(np.array(carried).reshape(-1, 2), 0.25, 0.5)
-        levers = np.maximum(self._approach.max(axis=0, initial=0.0), LEVER)
+        # a freedom counts as moving a point by 50 mm, a radian or metre, at least
+        levers = np.maximum(self._approach.max(axis=0, initial=0.0), 0.05)
         # shares: (nv,) by which freedoms count in the distance of two postures, as far as they move a point
         self.shares = levers / levers.max()
 
@@ -190,7 +185,7 @@ class Geodesics:
         kept = kept or self._kept
         key = q.tobytes(), kept is self._kept
         if key not in self._known:
-            if len(self._known) >= KNOWN:
+            if len(self._known) >= 128:  # those of a path are looked at again and again
                 self._known.clear()
             self._known[key] = self._looked(q, *kept)
         return self._known[key]
@@ -200,7 +195,7 @@ class Geodesics:
         values = self._values.at(state)
         if (values < sides[0]).any() or (values > sides[1]).any():
             return None
-        room = proximity.least(state.data, WITHIN) - self._least
+        room = proximity.least(state.data, 0.02) - self._least  # m; larger: fewer and dearer queries
         return Seen(room, proximity.distances.placed.copy()) if (room >= required).all() else None
 
     def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None, kept: Kept | None = None) -> bool:
@@ -224,7 +219,7 @@ class Geodesics:
             half = 0.5 * whole
             middle = np.asarray(pin.integrate(self._model, here, half))
             between = self._seen(middle, kept)
-            if between is None or len(asked) > PARTS:
+            if between is None or len(asked) > 400:  # what slides along something would be halved on and on
                 return False
             asked += [
                 (here, half, first, between, 0.5 * far, 0.25 * bent),
@@ -302,7 +297,7 @@ class TrackedMotions:
         while left > REACHED:
             here, before, q = q, rest, self._stepped(q)
             left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target, factors)
-            slow = rest > before - GAIN and left > REACHED
+            slow = rest > before - 5e-3 and left > REACHED  # rad, m; smaller: longer motions along things
             if slow or gone + left > most or BUDGET.over or not self.geodesics.keeps(q):
                 return way, False
             way.append(q)
@@ -332,7 +327,7 @@ class TrackedMotions:
                 q = self._settling.step(q, measures=False).q
             found[k] = q
         steps, usual = (np.array([self._apart(*pair) for pair in pairwise(each)]) for each in (found, path))
-        return found, (steps > JUMP * usual + REACHED) | late[1:]
+        return found, (steps > 1.5 * usual + REACHED) | late[1:]  # projected on two sides of something
 
     def _apart(self, q: Array, target: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._model, q, target)))

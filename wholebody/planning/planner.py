@@ -37,7 +37,6 @@ from wholebody.tasks.base import Bound, Constraint, Goal
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
-CORNERED = 12  # postures of each straight part of a path with corners; more = sooner at the end, dearer
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
     "wholebody.methods.qp.active_set",
@@ -49,7 +48,6 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
 )
-LEAST = 0.1  # s: a time limit below it counts as it; the straight motion of an arm takes less
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,7 +128,7 @@ def plan(
     goals = _goals(goal)
     compile_all(NEEDED)
     began = _computed()
-    with within_budget(max(limit, LEAST)):
+    with within_budget(max(limit, 0.1)):  # s: the straight motion of an arm takes less
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         _check_end(problem, problem.start, "start")
         sampler = Sampler(problem, rng)
@@ -207,7 +205,8 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     if not (found.solved or BUDGET.over):
         found = judge.judged([even])
     if not (found.solved or BUDGET.over):
-        found = judge.judged([local.settled(resampled(model, pair, CORNERED))[0] for pair in pairwise(path)])
+        # 12 postures of each straight part; more: sooner at the end, dearer
+        found = judge.judged([local.settled(resampled(model, pair, 12))[0] for pair in pairwise(path)])
     return found
 
 

@@ -24,9 +24,6 @@ STEPPED = 2  # samples of trees that look for a shorter path, of which one is st
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
 POLISHED = 0.65  # of the time limit: the shortest path is drawn tight again until then
-STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
-SMOOTHED = 0.2  # s: left for smoothing where a path is drawn tight on; a body's takes as long
-TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
 
 
 class Search:
@@ -77,12 +74,12 @@ class Search:
             long = self._local is not self._slides and not self._bodily and most > LONG * straight
             self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
-            straight = STRAIGHT * self._bodily
+            straight = 2 * self._bodily  # sweeps of a body's path towards the straight motion
             while self._local is not self._slides and BUDGET.spent < POLISHED:
                 with self._in_time(best):
                     left = BUDGET.left
                 # a path that there is no time to smooth stops at its corners, and is judged three times as long
-                if left < SMOOTHED:
+                if left < 0.2:  # s: a body's smoothing takes as long
                     break
                 # most of the remaining time is for smoothing
                 with within_budget(0.3 * left):
@@ -90,7 +87,7 @@ class Search:
                     tight = tighten(model, short, self._local, self._slides, straight)
                 best = min(best, short, tight, key=lambda path: length(model, path))
                 before, most = most, length(model, best)
-                if most > TIGHT * before:
+                if most > 0.97 * before:  # where it is longer, it stays as it is
                     if not straight:
                         break
                     straight = 0

@@ -14,13 +14,10 @@ from wholebody.figures.model_check import joint_of
 from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 
-WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
 APART = 0.35  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
-OVERSHOOT = 1.6  # of the distance to its neighbours' mean that a posture moves; 1 = converges in twice as many sweeps
 DRAWN = 0.15  # rad, m: by which a posture is drawn to the straight motion in a sweep; more = fewer of them are free
 NEARER = 0.3  # of its distance: by which a posture far from the straight motion is drawn to it
-SWEPT = 0.99  # of its length before a sweep: where it is longer after one, a path counts as tight
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
 
 
@@ -38,7 +35,7 @@ def shortcut(
     while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
         part = path[first : last + 1]
-        most = WORTH * length(model, part)
+        most = 0.98 * length(model, part)  # a shortcut is shorter
         alone = partial and failed % 2
         way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
         path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
@@ -90,7 +87,7 @@ def tighten(
         at = _lengths(model, band)
         line = [np.asarray(pin.interpolate(model, band[0], band[-1], place / at[-1])) for place in at]
         band = _swept(model, band, (local, slides), [_towards(model, *pair) for pair in zip(band, line, strict=True)])
-    while len(band) > 2 and not BUDGET.over and (now := length(model, band)) < SWEPT * before:
+    while len(band) > 2 and not BUDGET.over and (now := length(model, band)) < 0.99 * before:  # else it counts as tight
         before = now
         band = _swept(model, band, (local, slides), [])
     found = [band[0]]
@@ -118,7 +115,8 @@ def _swept(
 
 def _between(model: pin.Model, before: Array, q: Array, after: Array) -> Array:
     """The posture (nq,) between two neighbours of q, and on from there."""
-    return np.asarray(pin.interpolate(model, q, pin.interpolate(model, before, after, 0.5), OVERSHOOT))
+    # by 1.6 of the distance to their mean: 1 converges in twice as many sweeps
+    return np.asarray(pin.interpolate(model, q, pin.interpolate(model, before, after, 0.5), 1.6))
 
 
 def _brought(

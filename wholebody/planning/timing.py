@@ -22,8 +22,6 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.trajectory.retiming import passed
 from wholebody.planning.smoothing import places
 
-UNLIMITED = 1e9  # rad/s, m/s: no limit; that of a free root is the largest number
-
 
 @dataclass(frozen=True)
 class Pace(Checked):
@@ -51,7 +49,7 @@ class Pace(Checked):
         checks.instance(figure, Figure, "fastest: figure", "load one with wb.load('human')")
         own = np.array(figure.model.velocityLimit, dtype=float).reshape(-1)
         usual = 2.0 if self.velocity is None else self.velocity  # rad/s, m/s: of joints without a limit of their own
-        own = np.where((own > 0.0) & (own < UNLIMITED), own, usual)
+        own = np.where((own > 0.0) & (own < 1e9), own, usual)  # rad/s, m/s: a free root has the largest number
         return own if self.velocity is None else np.minimum(own, self.velocity)
 
 

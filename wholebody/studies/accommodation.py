@@ -29,7 +29,6 @@ from wholebody.tasks import inputs
 
 BUDGET = 30  # programs of restarts for one person: who is left out takes half of the time of 100
 REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches it
-FEW = 5  # people left out: some of 37 dimensions orders fewer than these well by chance
 
 
 class Share(NamedTuple):
@@ -62,7 +61,7 @@ class Exclusion(NamedTuple):
         words = f"{self.dimension.replace('_', ' ')} {self.side} {self.value:.3f} {unit}"
         who = {"male": ("man", "men"), "female": ("woman", "women")}[self.sex]
         said = f"{who[0]} does" if self.excluded == 1 else f"{who[1]} do"
-        chance = "" if self.excluded >= FEW else "; of so few, any dimension may do so by chance"
+        chance = "" if self.excluded >= 5 else "; of so few, any dimension may do so by chance"
         return f"{self.excluded} {said} not {self.verdict}: {words} tells them best{chance}"
 
 

@@ -23,9 +23,6 @@ from wholebody.studies.solving import Case, Run, Sender, batch_answers, run_batc
 from wholebody.tasks.answers import is_own
 
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
-LARGEST = 256  # problems of a batch. Larger: fewer calls; smaller: earlier progress, processes end together
-TOGETHER = 16  # cases of a job. More: fewer scenes are sent, and processes end less together
-RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
 
 
 class SolveProgress(NamedTuple):
@@ -148,7 +145,8 @@ def run_cases(
     found = {} if store is None else {k: store.done(case.asked) for k, case in enumerate(order)}
     done = {k: replace(record, name=order[k].record.name, factors=order[k].record.factors)
             for k, record in found.items() if record is not None}  # fmt: skip
-    tell, length = running.progress, RUN if warm_start else 1
+    # longer runs: fewer cold starts, fewer processes busy at the end
+    tell, length = running.progress, 16 if warm_start else 1
     numbered = [range(k, min(k + length, len(order))) for k in range(0, len(order), length)]
 
     def keep(number: int, record: SolveRecord) -> bool:
@@ -194,7 +192,8 @@ def _at_once(
     asked: Sequence[int], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool]
 ) -> bool:
     """Solve those cases that a method with `batches` answers many of at a time; whether the caller ended them."""
-    batches = running.method.batches([order[k].make() for k in asked], LARGEST)  # type: ignore[attr-defined]
+    # larger: fewer calls; smaller: earlier progress, processes end together
+    batches = running.method.batches([order[k].make() for k in asked], 256)  # type: ignore[attr-defined]
     work = {number: ([asked[k] for k in batch.places], batch) for number, batch in enumerate(batches)}
     with closing(_answers(run_batches, work, order, running)) as outcomes:
         for number, answers, error in outcomes:
@@ -253,7 +252,8 @@ def _answers(
         return
     # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
     # deadline is of one.
-    most = TOGETHER * len(keys) // max(1, len(cases))  # keys are of runs of cases
+    # 16 cases of a job; more: fewer scenes are sent, and processes end less together. Keys are of runs of cases.
+    most = 16 * len(keys) // max(1, len(cases))
     size = 1 if running.seconds else max(1, min(most, len(keys) // (4 * running.jobs)))
     alone = list[list[Any]]()
     for chunks in ([keys[k : k + size] for k in range(0, len(keys), size)], alone):

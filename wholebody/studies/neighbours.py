@@ -14,8 +14,6 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.studies.records import SolveRecord
 from wholebody.studies.solving import Case, most_turned, solve_from
 
-NEIGHBOURS = 2  # answers of others that are tried for one problem, for each of at most two factors that vary: more find
-# more, and cost where there is no answer
 TRIES = 4  # more solves of a case whose posture jumps: its own start, both neighbours, and one that changed since
 JUMP = radians(10.0)  # a posture that turns a joint further from one case to the next is another strategy
 
@@ -43,7 +41,8 @@ def solve_from_neighbours(family: Family, linked: Mapping[int, int] = MappingPro
         if k in tried and j in done and done[j].solved:
             tried[k][j] = 1
     places = np.array([case.place for case in order], dtype=np.intp)
-    most = NEIGHBOURS * min(max(int((places != places[0]).any(axis=0).sum()), 1), 2)
+    # two for each of at most two factors that vary: more find more, and cost where there is no answer
+    most = 2 * min(max(int((places != places[0]).any(axis=0).sum()), 1), 2)
     while True:
         solved = np.array(sorted(j for j, one in done.items() if one.solved and one.q is not None), dtype=np.intp)
         sizes = np.array([len(done[j].q) for j in solved.tolist()], dtype=np.intp)  # type: ignore[arg-type]

@@ -12,8 +12,6 @@ from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import AGE, PERCENTILE, Person, dimension_names, make_person
 from wholebody.figures.population import SEXES, population
 
-MOST = 10_000  # people of a sex at once
-
 SEATED = ("sitting_height", "bideltoid_breadth", "hip_breadth_sitting", "buttock_knee_length", "popliteal_height")
 """Dimensions of `boundary` that are not left out: those of a seat."""
 
@@ -63,7 +61,7 @@ def people(
             for own in sexes
             for name, share in named.items()
         }
-    most = checks.whole(100 if count is None else count, "people: count", 1, MOST)
+    most = checks.whole(100 if count is None else count, "people: count", 1, 10_000)
     rng = checks.whole(seed, "people: seed", 0, 2**32 - 1)
     found = {}
     for own in sexes:

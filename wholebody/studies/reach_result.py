@@ -18,7 +18,6 @@ from wholebody.problem import Problem
 
 INCHES = 2.4  # width of one height
 MEANING = "above 0: reached, 1 with the least measure\nbelow 0: metres short; gray: inside a thing"
-INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
 VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")  # Words of the codes of a verdict
@@ -204,7 +203,7 @@ class ReachMap(Shown):
             values[:, :, k], origin="lower", extent=extent, cmap=colors, vmin=-1.0, vmax=1.0, interpolation="nearest"
         )
         gray = np.zeros((*values.shape[:2], 4))
-        gray[self.inside[:, :, k]] = INSIDE_GRAY
+        gray[self.inside[:, :, k]] = (0.35, 0.35, 0.38, 1.0)
         axis.imshow(gray, origin="lower", extent=extent, interpolation="nearest")
         axis.invert_xaxis()
         axis.set_title(f"z = {self.z[k]:.2f} m", fontsize="small")

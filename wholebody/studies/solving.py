@@ -33,8 +33,6 @@ SHIFTING = ("JointModelP", "JointModelTranslation")
 Run = tuple[Any, Sequence[Make]]
 """The posture (nq,) from which the first of some problems is tried, None for its own start; and the problems."""
 
-NEAR = 50  # programs of a solve from another's answer. Of 61 that succeeded none took over 20; more cost misses alone.
-
 
 @dataclass(frozen=True)
 class Case:
@@ -78,7 +76,8 @@ def _warm_answer(problem: Problem, method: Method, q: Array) -> dict[str, Any] |
     try:
         begun = begun_at(problem, q)
         if type(plain) is QP:  # feasibility first, as what is closest is of no use here
-            near = replace(plain, iterations=min(plain.iterations, NEAR))
+            # of 61 that succeeded none took over 20; more cost misses alone
+            near = replace(plain, iterations=min(plain.iterations, 50))
             solution = next(near.minima(begun, [begun.start]))
         else:
             solution = plain.solve(begun)

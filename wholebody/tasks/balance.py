@@ -35,7 +35,6 @@ came 20 to 59 % less far from the middle of the stance than the edges are (Forth
 33: 715, its abstract); here it is 30 %."""
 
 DOWN = np.array((0.0, 0.0, -1.0))
-FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
@@ -212,7 +211,8 @@ class SolePolygon(NamedTuple):
     def inside(self, state: State, center: Array, moves: Array) -> tuple[Array, Array]:
         """The same of another point (2,) or (3,) than the centre of mass, with its derivative."""
         points = self._placed(state)
-        values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
+        # a point that is no corner of the polygon is far inside, by 1 m
+        values, rows = np.full(len(points), 1.0), np.zeros((len(points), state.model.nv))
         corners = hull_corners(points[:, :2])
         if not corners:
             return values, rows

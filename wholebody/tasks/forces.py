@@ -114,7 +114,7 @@ class LoadedBalance(ComputedTogether):
 
     As `Balance`, which it takes the place of, but of the point where the ground presses in place of the centre of mass:
     who pushes leans forward, and who carries leans back. The polygon goes with the feet, which may slide: that of the
-    points on which they stand at the start, a row for each [m]; `tasks.balance.FAR_INSIDE` for one that is no corner.
+    points on which they stand at the start, a row for each [m]; 1 m for one that is no corner.
 
     Attributes:
         forces: on the figure beside its weight.

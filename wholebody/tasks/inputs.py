@@ -22,7 +22,6 @@ from wholebody.scene.scene import Scene
 
 T = TypeVar("T")
 
-FAR = 30.0  # m: farther is hardly meant
 FARTHEST = 100.0  # Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre
 
 WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out")
@@ -110,7 +109,7 @@ def point(value: object, where: str) -> Array:
 def check_reachable(place: Array, where: str) -> None:
     """Refuse a position that cannot be in metres."""
     distance = math.hypot(*place.tolist())  # the square of a large one is no number
-    if distance <= FAR:
+    if distance <= 30.0:  # m: farther is hardly meant
         return
     if distance > FARTHEST:
         raise InputError(

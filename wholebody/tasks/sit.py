@@ -21,7 +21,6 @@ from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Made,
 from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, segments_on, surface
 
 UP = np.array((0.0, 0.0, 1.0))
-MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +79,7 @@ class Sit(ContactTerm):
         if not bottom.pieces:
             raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")
         thing = surface(scene, self.on, where)
-        edge = np.maximum(seat.half - np.minimum(MARGIN, 0.5 * seat.half), 0.0)
+        edge = np.maximum(seat.half - np.minimum(0.08, 0.5 * seat.half), 0.0)  # m: half a narrow seat
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place, rest) + 0.01
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))

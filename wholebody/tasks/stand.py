@@ -25,9 +25,7 @@ from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.sit import UP
 from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, segments_beyond, segments_on, surface
 
-FLESH = 0.03  # m: how much farther ahead than the ankle a shin may be on which somebody kneels
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
-LEADS = 0.001  # m by which the right foot is rather ahead: of a split stance and its mirror image one is lower
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +96,8 @@ class Stand(TermOfParts):
                 bears, end = joined(scene, foot, [foot, *above]), joined(scene, f"{foot}'s foot", toes)
                 parts += [Gap(bears, thing, ground), Gap(end, thing, ground)]
                 ahead = np.asarray(rest.data.oMi[int(scene.model.supports[place.joint][1])].rotation[:, 0])
-                lows = [_lows(sole, rest, ahead, FLESH), _lows(end, rest, ahead, STANDING_HEIGHT)]
+                # somebody kneels on a shin that is up to 30 mm farther ahead than the ankle
+                lows = [_lows(sole, rest, ahead, 0.03), _lows(end, rest, ahead, STANDING_HEIGHT)]
             else:
                 bears = sole
                 up = rest.frame(place.frame).rotation.T @ UP
@@ -172,7 +171,7 @@ class Stance(SumOfSquares):
         found = filled(self, places=places, rest=np.zeros(3))
         with scene.figure.posed(scene.figure.neutral) as upright:
             rest = found.squares(upright)[0] / np.sqrt(STANCE_WEIGHTS)
-        return filled(found, rest=rest + (LEADS, 0.0, 0.0))
+        return filled(found, rest=rest + (0.001, 0.0, 0.0))  # m: of a split stance and its mirror image one is lower
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (3,) and their derivatives (3, nv)."""
@@ -202,9 +201,6 @@ def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[lis
     return [point for point, _ in pairs], [joint for _, joint in pairs]
 
 
-HANGS = 6.0  # 1/rad^2, beside an effort of 0.7 that counts from the trunk: ESTIMATE
-
-
 BELOW = np.array((1.0, 1.0, -1.0))  # x, y and down by x, y and z
 
 
@@ -230,7 +226,7 @@ class Hang(SumOfSquares):
     """
 
     arms: Annotated[Sequence[str], Names("['left_upper_arm']")] = ("left_upper_arm", "right_upper_arm")
-    weight: inputs.Weight = HANGS
+    weight: inputs.Weight = 6.0  # 1/rad², beside an effort of 0.7 that counts from the trunk: ESTIMATE
     places: tuple[inputs.Place, ...] = field(init=False, repr=False)
     down: Array = field(init=False, repr=False)
 

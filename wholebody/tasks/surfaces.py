@@ -29,7 +29,6 @@ _T = TypeVar("_T")
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
 STANDING = -1  # the number of what no posture moves
-MOST_KEPT = 256  # surfaces and pairs of which a state keeps where they are: hundreds of problems may share one
 NO_REACH = np.zeros(0)
 _REQUEST = coal.DistanceRequest()
 _REQUEST.gjk_tolerance = _REQUEST.epa_tolerance = ACCURACY
@@ -77,7 +76,7 @@ class Surface(NamedTuple):
         kept: Where | None = state.kept.get(key)
         if kept is not None and kept.number in (state.number, STANDING) and kept.first == first:
             return kept
-        if len(state.kept) > MOST_KEPT:
+        if len(state.kept) > 256:  # hundreds of problems may share one state
             state.kept.clear()
         joints = state.data.oMi
         if fixed is not None:

@@ -20,7 +20,6 @@ from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Made, Meeting, OwnSurface, Part, owner_pairs
 from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
 
-THICK = 0.1  # m: of a thicker thing no point gets to the far side
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 WITHIN_FACE = 1e-3  # m: and one on a face is within it if it is this far from all others
 
@@ -152,7 +151,7 @@ def on_its_side(term: Any, scene: Scene, state: State, distance: float) -> Any:
     if not isinstance(part, Gap) or part.first.fixed is None or abs(part.rows(state)[0][0]) <= distance:
         return term
     thickness = max(each.width for each in part.second.swept)
-    if thickness > THICK:
+    if thickness > 0.1:  # m: of a thicker thing no point gets to the far side
         return term
     own = [each for each in scene.figure.segments if each in scene.piece_owner]
     for way in _faces_of(scene, part.first):

@@ -26,7 +26,6 @@ from wholebody.tasks.inputs import FARTHEST, direction, point
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, moving_goal, retarget, warm_started
 
-SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
 MOST_GOALS = 10_000
 
 
@@ -44,7 +43,7 @@ def follow_path(
     method: str | Method = "newton",
     *,
     goal: int = 0,
-    spacing: float = SPACING,
+    spacing: float = 0.05,
 ) -> tuple[Solution, ...] | tuple[AssemblySolution, ...]:
     """Move a goal along a path, through evenly spaced intermediate goals.
 

@@ -12,9 +12,6 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown, whole
 from wholebody.base.errors import InputError
 
-LONGEST = 65536  # bytes of a datagram
-MOST = 1000  # datagrams that are read at once
-
 
 class Receiver:
     """Listens at a port of this machine.
@@ -41,9 +38,9 @@ class Receiver:
     def latest(self) -> dict[str, Array]:
         """The last place (3,) [m] of every handle that has arrived since the last call."""
         found: dict[str, Array] = {}
-        for _ in range(MOST):
+        for _ in range(1000):  # datagrams at once
             try:
-                data = self._socket.recv(LONGEST)
+                data = self._socket.recv(65536)  # bytes of a datagram
             except BlockingIOError:
                 break
             found |= self._read(data)

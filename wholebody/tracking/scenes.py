@@ -28,8 +28,6 @@ from wholebody.tracking.frame import FRAME
 Place = tuple[float, float, float]
 Thing = Mapping[str, Any]
 
-STILL = ("hip", "knee", "ankle", "toe")
-"""Parts of the names of joints without tremor, because the feet stand on the floor."""
 WAVES = 5
 
 
@@ -181,7 +179,7 @@ def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) ->
     size = np.zeros(figure.model.nv)
     for joint in figure.joints:
         # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
-        size[figure.dofs(joint)] = 0.0 if any(part in joint for part in STILL) else 2e-3
+        size[figure.dofs(joint)] = 0.0 if any(part in joint for part in ("hip", "knee", "ankle", "toe")) else 2e-3
     shake = np.zeros((len(q), figure.model.nv))
     for _ in range(WAVES):
         rate = 2.0 * np.pi * rng.uniform(0.3, 2.0, figure.model.nv)  # Hz

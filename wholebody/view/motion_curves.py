@@ -32,7 +32,6 @@ from wholebody.view.viewer import Viewer
 Names: TypeAlias = str | os.PathLike[str] | Mapping[str, Mapping[str, str]]
 """Which joint and frame are which part of a body, as `wb.retarget` takes it."""
 
-JOINTS = 8  # that are drawn: those that move most, or that are changed most
 RECORDING = "recording"
 NEAR = 0.1  # m: distances that are drawn
 
@@ -74,7 +73,7 @@ def _joints(clips: Mapping[str, Clip]) -> list[dict[str, Any]]:
     ranges, changes = np.ptp(ends[0], axis=0), np.abs(ends[1] - ends[0]).max(axis=0)
     columns = list(places.values())
     telling = ranges / max(ranges[columns].max(), 1e-9) + changes / max(changes[columns].max(), 1e-9)
-    for joint in sorted(places, key=lambda name: -telling[places[name]])[:JOINTS]:
+    for joint in sorted(places, key=lambda name: -telling[places[name]])[:8]:
         for name, clip in clips.items():
             lines.append((joint, name, clip.q[:, places[joint]]))
     return [_chart("joints that move or change most", "rad, m", lines)]

@@ -6,8 +6,6 @@ from wholebody.cli.arguments import JOBS
 from wholebody.cli.bench.command import CLIPS, folders, listed, measuring, quick, seed
 from wholebody.cli.command import Group, command, count, flag, later, path, real, text, whole
 
-PROBLEMS = path("--problems", "DIR", "folder of the exported problems", required=True)
-
 group = Group(
     "bench",
     "measure steps, solves and problem sets, beside other tools where installed",
@@ -74,7 +72,7 @@ from the files by Pinocchio and coal alone. Prints a table, and writes every fig
 are refused with one sentence that names the entry. Of a folder with a file of answers for each method it makes a
 leaderboard: a page with tables, charts and sentences that say what to choose when, and what cannot be told apart.""",
             path("answers", "ANSWERS", "a file, as answers.schema.json says, or a folder of them"),
-            PROBLEMS,
+            path("--problems", "DIR", "folder of the exported problems", required=True),
             path(
                 "--out",
                 "PATH",

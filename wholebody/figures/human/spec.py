@@ -31,9 +31,6 @@ from wholebody.figures.human import details
 from wholebody.figures.sizes import MIDDLE_TIP
 from wholebody.figures.tables import keyed, table
 
-HANDS = ("rigid", "fingers")
-"""What a person's hands can be: one segment each, or palms with fingers of twenty joints a hand, see `figures.hand`."""
-
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": details.spheres,
     "capsules": details.solids,
@@ -44,7 +41,7 @@ DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
 def human_spec(person: Person | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
     """Return the specification of a person, or of the median man; arguments and errors as for `wholebody.load`."""
     person = person or make_person()
-    known(hands, HANDS, "kind of hands", "human")
+    known(hands, ("rigid", "fingers"), "kind of hands", "human")
     if hands == "fingers" and detail == "spheres":
         raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
     spec = BodySpec(

@@ -28,8 +28,6 @@ from wholebody.geometry.meshes import check_content
 FREE, BALL, SLIDE, HINGE = range(4)
 """Types of joints, as MuJoCo numbers them."""
 
-RGB = 1  # what a texture of a material is for: its colour, as MuJoCo numbers it
-
 
 def is_mjcf(path: Path) -> bool:
     """Whether the first element of a file is <mujoco>. MuJoCo also reads files that are not quite XML."""
@@ -171,7 +169,7 @@ class Compiled:
             if material < 0:
                 return None
             color = model.mat_rgba[material].astype(float)
-            texture = int(model.mat_texid[material][RGB])
+            texture = int(model.mat_texid[material][1])  # the colour, as MuJoCo numbers what a texture is for
             if texture >= 0:
                 first, channels = int(model.tex_adr[texture]), int(model.tex_nchannel[texture])
                 count = int(model.tex_height[texture]) * int(model.tex_width[texture]) * channels

@@ -19,8 +19,6 @@ from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_robot, unique_names
 from wholebody.geometry.pieces import LARGEST
 
-EXTENSION = "wholebody"  # name of the element of our extension; see `wholebody.figures.urdf.extension`
-
 
 class LinkVisual(NamedTuple):
     """One visual of a link, whose file is absolute; red, green, blue, alpha of its material, None without one."""
@@ -71,7 +69,7 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     ordered = (root, *(name for name in links if name != root))
     name = robot.get("name") or path.stem
     return UrdfFile(
-        path, name, ordered, inertials, joints, tuple(shapes), colors, tuple(visuals), robot.find(EXTENSION),
+        path, name, ordered, inertials, joints, tuple(shapes), colors, tuple(visuals), robot.find("wholebody"),
         (*notes, *remarks),
     )  # fmt: skip
 

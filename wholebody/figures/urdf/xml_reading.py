@@ -16,8 +16,6 @@ from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
-MOST = 1e9  # largest number that is accepted as a mass, a length, a speed or an inertia in SI units
-
 
 def read_xml(path: Path, kind: str) -> Element:
     """Return the outermost element of an XML file of a kind, such as "URDF"."""
@@ -78,7 +76,7 @@ def numbers(element: Element, name: str, place: str, count: int, default: str | 
 
 
 def bounded(
-    element: Element, name: str, place: str, count: int, default: str | None = None, most: float = MOST
+    element: Element, name: str, place: str, count: int, default: str | None = None, most: float = 1e9
 ) -> tuple[float, ...]:
     """Return the numbers of an attribute as `numbers` does, none of them larger than `most`."""
     found = numbers(element, name, place, count, default)

@@ -26,9 +26,6 @@ from wholebody.tasks import Freeze, Plane
 
 Kind = Literal["linear", "quadratic"]
 
-COUNT = Range(1, MOST_FRAMES, whole=True)
-FAR = 0.3  # rad, m: a prediction that goes farther may be a poor local answer, and others are tried
-
 
 def _frames(value: Any, what: str) -> tuple[int, ...]:
     return tuple(whole(frame, what, 0, MOST_FRAMES) for frame in listed(value, what, "[0, 12, 40]"))
@@ -76,7 +73,7 @@ class Bisection(Checked):
 
     evaluation: Annotated[tuple[int, ...], _frames] | None = None
     buffer: Annotated[float, Range(0.0, 1000.0, "percent")] = 50.0
-    least: Annotated[int, COUNT] = 3
+    least: Annotated[int, Range(1, MOST_FRAMES, whole=True)] = 3
     interpolation: Kind = "linear"
     planes: Annotated[tuple[str, ...], _names] | None = None
     frozen: Annotated[tuple[str, ...], _names] | None = None
@@ -184,7 +181,8 @@ class Recursion:
         planes = path_planes(self._run.scene.figure, self.q, frame, self._swinging(frame), self._state)
         short = self._short
         found = [self._predicted(frame, self.q[frame], planes, short)]
-        if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
+        # rad, m: a prediction that goes farther may be a poor local answer
+        if not found[0].good or self._predictor.farthest(frame, found[0].q) > 0.3:
             found += [self._predicted(frame, start, [], short) for start in self._beside(frame)]
             if planes and not any(prediction.good for prediction in found):
                 found.append(self._predicted(frame, self.q[frame], [], short))

@@ -25,7 +25,6 @@ from wholebody.motion.clip import MOST_FRAMES, ROOT_SIZE
 from wholebody.motion.files.base import Frames, Motion, check_one
 
 VERSION = 1  # of the layout of the arrays
-APART = 1e-3  # m: joints of one figure are as far from each other, but for what another version makes of a person
 PEOPLE = ("human", "avatar", "hand")  # figures that their options make anywhere
 
 
@@ -150,7 +149,7 @@ def _check_places(path: Path, arrays: dict[str, NDArray[np.generic]], figure: Fi
     if places.dtype.kind != "f" or places.shape != here.shape:
         raise FileFormatError(f"{path.name}: joint_places do not fit the joints; write the clip anew")
     apart = np.linalg.norm(places.astype(np.float64) - here, axis=1)
-    if np.all(apart <= APART):  # not of NaN
+    if np.all(apart <= 1e-3):  # m; not of NaN
         return
     worst = int(np.argmax(np.nan_to_num(apart, nan=np.inf)))
     told = f", {one_line(str(arrays['loaded_as']), 200)}" if "loaded_as" in arrays else ""

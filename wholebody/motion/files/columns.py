@@ -23,7 +23,6 @@ from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, check_one
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
 LATEST = 1e9  # s
 TIME = "time"
-DEGREES = ("deg", "degrees", "°")
 UNIT = re.compile(r"\s*[\[(](deg|degrees|°|rad|radians)[\])]$|[\s_](deg|degrees|rad|radians)$", re.IGNORECASE)
 
 
@@ -150,7 +149,7 @@ def _in_degrees(column: str, name: str, figure: Figure, *, default: bool) -> boo
     """Whether the column of a name is in degrees: as it says itself, and otherwise as others do, if its joint turns."""
     unit = UNIT.search(column) if column != name else None
     if unit is not None:
-        return (unit[1] or unit[2]).lower() in DEGREES
+        return (unit[1] or unit[2]).lower() in ("deg", "degrees", "°")
     turns = name in figure.joints and not figure.model.joints[figure.joint_id(name)].shortname().startswith(
         "JointModelP"
     )

@@ -29,10 +29,6 @@ JOINT = "joint "  # before the name of a joint, in the name of its node
 UPWARD: Array = np.eye(4)
 UPWARD[:3, :3] = UP["y"].T
 
-ROUND = (coal.Sphere, coal.Capsule, coal.Ellipsoid)
-
-SKIN = (0.84, 0.74, 0.65, 1.0)  # the colour of pieces that have none
-
 
 def write(motion: Motion, path: Path) -> Path:
     """Write a clip as an animation: y up, z forward, metres, one keyframe a frame, interpolated linearly."""
@@ -44,7 +40,7 @@ def write(motion: Motion, path: Path) -> Path:
     for piece in figure.geometry.geometryObjects:
         link = figure.model.frames[piece.parentFrame].name
         if link not in drawn and not isinstance(piece.geometry, coal.Halfspace):  # it has no end
-            given = piece.meshColor if piece.overrideMaterial else SKIN
+            given = piece.meshColor if piece.overrideMaterial else (0.84, 0.74, 0.65, 1.0)
             tree.piece(
                 f"piece {piece.name}", int(piece.parentJoint), piece.placement.homogeneous, piece.geometry, given
             )
@@ -95,7 +91,7 @@ class JointTree:
         else:
             mesh = triangles(shape)
             vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-            normals = mesh.vertex_normals if isinstance(shape, ROUND) else None
+            normals = mesh.vertex_normals if isinstance(shape, (coal.Sphere, coal.Capsule, coal.Ellipsoid)) else None
         paint = self.builder.material(color, both_sides=sheet)
         made = self.builder.mesh(name, [self.builder.primitive(vertices, faces, paint, normals)])
         self.builder.node(name, self._nodes[joint], np.asarray(placement), mesh=made)

@@ -38,8 +38,6 @@ from wholebody.scene.scene import Scene
 
 LENGTH = 0.1  # metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support
 
-TOLERATED = 5e-4
-"""Metres, see `LENGTH`: what a frame whose postures are free may be beyond its bounds without being changed."""
 
 NEAR = 0.05  # metres: a load that is farther from its bound has no row; what passes unseen has one in the next step
 
@@ -179,8 +177,8 @@ class ClipLoads:
         return found
 
     def beyond(self) -> Mask:
-        """(n,) frames whose loads are beyond their bounds by more than `TOLERATED`."""
-        return self.worst() > TOLERATED
+        """(n,) frames whose loads are beyond their bounds by more than is tolerated where postures are free."""
+        return self.worst() > 5e-4  # m, see `LENGTH`
 
     def timed(self, b: Array) -> TimedRows:
         """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that."""

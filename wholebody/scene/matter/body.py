@@ -172,7 +172,6 @@ def joints(value: object, what: str) -> tuple[BallJoint, ...]:
 
 
 MASS = Range(1e-9, 1e9, "kg")
-DENSITY = 700.0  # kg/m3: of oak
 
 
 @dataclass(frozen=True)
@@ -210,7 +209,7 @@ class Body(Checked):
             raise InputError("Body has both a density and a mass; give one of them")
         super().__post_init__()
         if self.mass is None and self.density is None:
-            settle(self, "density", DENSITY)
+            settle(self, "density", 700.0)  # kg/m³ of oak
 
     @property
     def resolved_material(self) -> Material:
