@@ -213,3 +213,13 @@ def test_other_starts_are_tried_where_the_first_minimum_is_dear(
     solution = wb.solve(problem_set(name).make(number, seed).problem)
     assert solution.solved
     assert solution.assessment.measure < 1.03 * least
+
+
+@pytest.mark.parametrize("number", [2, 6])
+def test_descents_through_things_are_stopped_by_none(number: int) -> None:
+    """A step of each of these passes through a thing to the other side."""
+    from wholebody.bench.suite.problem_sets.registry import problem_set
+
+    notes = [entry.note for entry in wb.solve(problem_set("clutter").make(number, 2028).problem).trace]
+    assert any(note.startswith("through things") for note in notes)
+    assert "through things: blocked" not in notes

@@ -270,16 +270,15 @@ class QPMultistart(Search):
             self._lower(q)
 
     def _below_things(self, others: Iterable[Array]) -> float:
-        """Seek a lower minimum beside one through things: from the start where things are in the way, else from others.
+        """Seek a lower minimum beside one through things: from the best; from others where nothing is in its way.
 
         Returns:
             The least measures through things; 0 where none are known.
         """
         less = SEARCH.less_of_contacts if self._touches else SEARCH.less
         through, best = self._through(self.best.q, less), self.best.measure
-        blocked = through.measure < less * best
-        for q in [self._start] if blocked else others:
-            local = self._through(q, less, feasible=not blocked)
+        for q in () if through.measure < less * best else others:
+            local = self._through(q, less, feasible=True)
             through = local if local.measure < through.measure else through
         if through.measure < less * best and not self.control.over:
             self._lower(through.q)
@@ -293,10 +292,8 @@ class QPMultistart(Search):
         alone, most = self.lineariser.relaxed(ENDLESS), self._at_most(SEARCH.probe_programs)
         if feasible:
             start = self._ran(self._feasibility(alone, most, "through things"), start).q
-        shared = with_values(self._shared, lineariser=alone)
-        descent = SQP(shared, self.settings.tolerance, most, "through things")
-        descent.below = less * self.best.measure
-        local = self._ran(descent, start)
+        given = with_values(self._shared, lineariser=alone), self.settings.tolerance, most, "through things"
+        local = self._ran(SQP(*given, width=SEARCH.width, below=less * self.best.measure, through=True), start)
         met = local.violation.worst <= self.settings.tolerance
         return local if met else with_values(local, measure=np.inf)
 

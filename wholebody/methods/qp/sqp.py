@@ -34,6 +34,7 @@ class SQP(Stage):
     full_step: bool = False
     width: float = DESCENT.width  # of the funnel at first
     below: float = np.inf  # measures that are to be undercut: a descent that is not going to ends
+    through: bool = False  # whether steps may pass through things
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -199,7 +200,7 @@ class SQP(Stage):
             return None
         acceptance = self._judge(here, there, step)
         watched = not acceptance.accepted and self._is_tentative(here, there)
-        if (acceptance.accepted or watched) and self.jumps(here, there):
+        if (acceptance.accepted or watched) and not self.through and self.jumps(here, there):
             acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
         self.record(there, "tentative" if watched else acceptance.by)
         if watched:
