@@ -15,7 +15,8 @@ from wholebody.planning.ends import End, nearer
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
-from wholebody.planning.smoothing import length, shortcut, tighten
+from wholebody.planning.smoothing import length, shortcut
+from wholebody.planning.tightening import tighten
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
@@ -24,7 +25,6 @@ STEPPED = 2  # samples of trees that look for a shorter path, of which one is st
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
 POLISHED = 0.65  # of the time limit: the shortest path is drawn tight again until then
-STRAIGHT = 2  # sweeps of a tightened path of a body towards the straight motion
 SMOOTHED = 0.2  # s: left for smoothing where a path is drawn tight on; a body's takes as long
 TIGHT = 0.97  # of its length before it was drawn tight: where it is longer, it stays as it is
 
@@ -77,7 +77,6 @@ class Search:
             long = self._local is not self._slides and not self._bodily and most > LONG * straight
             self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
-            straight = STRAIGHT * self._bodily
             while self._local is not self._slides and BUDGET.spent < POLISHED:
                 with self._in_time(best):
                     left = BUDGET.left
@@ -87,13 +86,11 @@ class Search:
                 # most of the remaining time is for smoothing
                 with within_budget(0.3 * left):
                     short = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
-                    tight = tighten(model, short, self._local, self._slides, straight)
+                    tight = tighten(model, short, self._local, self._slides)
                 best = min(best, short, tight, key=lambda path: length(model, path))
                 before, most = most, length(model, best)
                 if most > TIGHT * before:
-                    if not straight:
-                        break
-                    straight = 0
+                    break
             paths = sorted([best, *paths], key=lambda path: length(model, path))
             best = next((path for path in paths if self._proven(path)), None)
         if best is not None:
