@@ -40,6 +40,7 @@ TOGETHER = (
         "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
+        "wholebody.planning.multiplier_kernel",
     ),
     (
         "wholebody.methods.qp.tracking",

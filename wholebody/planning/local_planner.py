@@ -116,6 +116,11 @@ class Geodesics:
             kept.sides[0] = np.minimum(kept.sides[0], values - NOISE)
             kept.sides[1] = np.maximum(kept.sides[1], values + NOISE)
 
+    @property
+    def sides(self) -> Array:
+        """(2, c) least and largest values of constraints at postures of paths."""
+        return self._kept.sides
+
     def free(self, q: Array) -> bool:
         """Whether a posture (nq,) keeps the distances."""
         return self._seen(q) is not None
@@ -259,6 +264,7 @@ class TrackedMotions:
         self._resting = self._problem.with_start(problem.start)
         self._resting.goals = self._resting.measures = ()
         self._settling = QP(restarts=0).tracker(self._resting, 1.0)
+        self._lineariser = self._resting.lineariser(workspace)
 
     def admit(self, q: Array) -> None:
         """See `Geodesics`."""
@@ -308,13 +314,25 @@ class TrackedMotions:
         found: Array = self._tracker.step(q).q
         return found if self.geodesics.keeps(found) else self._settling.step(found, measures=False).q
 
-    def step(self, q: Array, target: Array) -> Array:
-        """The posture (nq,) of one step from q towards a target, in which all freedoms count alike, as in lengths."""
-        self._attraction.weigh(np.ones(self._model.nv))
-        self._attraction.toward(target)
-        found = self._stepped(q)
-        self._attraction.weigh(self.shares**2)
-        return found
+    def rows(self, q: Array) -> tuple[Array, Array]:
+        """Rows (r, nv) and gaps (r,) of what is near q (nq,), of constraints and limits.
+
+        Displacements x by which ``gap + rows @ x`` is not negative keep them; what is missed has a gap of 0.
+        """
+        self._lineariser.take((), self._resting.clearances)
+        at = self._lineariser.at(q, 0.08)  # m: farther = more rows, fewer displacements that are cut
+        sides, each = self.geodesics.sides, np.eye(self._model.nv)
+        gaps = np.concatenate([
+            at.gap - at.clearance - 1e-3,  # m: rows are straight, and distances are not
+            at.value - sides[0], sides[1] - at.value, -at.lower, at.upper,
+        ])  # fmt: skip
+        rows = np.concatenate([at.gap_jacobian, at.value_jacobian, -at.value_jacobian, each, -each])
+        counts = gaps < 1.0  # rad, m: farther than any displacement
+        return rows[counts], np.maximum(gaps[counts], 0.0)
+
+    def displaced(self, q: Array, away: Array) -> Array:
+        """The posture (nq,) that is displaced from q by a tangent (nv,), within limits."""
+        return self._problem.scene.figure.clamp(np.asarray(pin.integrate(self._model, q, away)))
 
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `Geodesics`."""

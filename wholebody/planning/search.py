@@ -15,7 +15,8 @@ from wholebody.planning.ends import End, nearer
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
-from wholebody.planning.smoothing import length, shortcut, tighten
+from wholebody.planning.smoothing import length, shortcut
+from wholebody.planning.tightening import tighten
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
@@ -74,23 +75,20 @@ class Search:
             long = self._local is not self._slides and not self._bodily and most > LONG * straight
             self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
         if best is not None:
-            straight = 2 * self._bodily  # sweeps of a body's path towards the straight motion
             while self._local is not self._slides and BUDGET.spent < POLISHED:
                 with self._in_time(best):
                     left = BUDGET.left
                 # a path that there is no time to smooth stops at its corners, and is judged three times as long
-                if left < 0.2:  # s: a body's smoothing takes as long
+                if left < 0.2:
                     break
                 # most of the remaining time is for smoothing
                 with within_budget(0.3 * left):
                     short = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
-                    tight = tighten(model, short, self._local, self._slides, straight)
+                    tight = tighten(model, short, self._local, self._slides)
                 best = min(best, short, tight, key=lambda path: length(model, path))
                 before, most = most, length(model, best)
                 if most > 0.97 * before:  # where it is longer, it stays as it is
-                    if not straight:
-                        break
-                    straight = 0
+                    break
             paths = sorted([best, *paths], key=lambda path: length(model, path))
             best = next((path for path in paths if self._proven(path)), None)
         if best is not None:

@@ -12,12 +12,11 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.model_check import joint_of
 from wholebody.methods.control import BUDGET
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+from wholebody.planning.local_planner import LocalPlanner
 
+WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
-APART = 0.35  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
-DRAWN = 0.15  # rad, m: by which a posture is drawn to the straight motion in a sweep; more = fewer of them are free
-NEARER = 0.3  # of its distance: by which a posture far from the straight motion is drawn to it
+APART = 0.5  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
 
 
@@ -35,7 +34,7 @@ def shortcut(
     while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
         part = path[first : last + 1]
-        most = 0.98 * length(model, part)  # a shortcut is shorter
+        most = WORTH * length(model, part)
         alone = partial and failed % 2
         way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
         path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
@@ -72,76 +71,7 @@ def _together(model: pin.Model, freedom: int, rng: np.random.Generator) -> list[
     return [model.joints[j].idx_v + k for j in chosen for k in range(model.joints[j].nv)]
 
 
-def tighten(
-    model: pin.Model, path: list[Array], local: LocalPlanner, slides: TrackedMotions, straight: int = 0
-) -> list[Array]:
-    """A path drawn tight round things as a band is: sweeps bring each posture to between its neighbours.
-
-    Steps of the tracker do so where things are in the way. Few shortcuts do as they go from one posture to another one,
-    and none through what touches on both sides (elastic bands, Quinlan and Khatib 1993; by successive overrelaxation).
-    That converges slowly where many neighbours are equally far from the straight motion, so the first sweeps, as many
-    as `straight` says, bring all of them nearer to this one.
-    """
-    band, before = _band(model, path, local), np.inf
-    for _ in range(straight):
-        at = _lengths(model, band)
-        line = [np.asarray(pin.interpolate(model, band[0], band[-1], place / at[-1])) for place in at]
-        band = _swept(model, band, (local, slides), [_towards(model, *pair) for pair in zip(band, line, strict=True)])
-    while len(band) > 2 and not BUDGET.over and (now := length(model, band)) < 0.99 * before:  # else it counts as tight
-        before = now
-        band = _swept(model, band, (local, slides), [])
-    found = [band[0]]
-    for q in band[1:]:
-        found += local.joined(found[-1], q, np.inf) or [q]
-    return found
-
-
-def _towards(model: pin.Model, q: Array, line: Array) -> Array:
-    """The posture (nq,) on the geodesic from q to another one that is at most `DRAWN` away."""
-    far = float(np.linalg.norm(pin.difference(model, q, line)))
-    return np.asarray(pin.interpolate(model, q, line, min(1.0, max(DRAWN / max(far, 1e-15), NEARER))))
-
-
-def _swept(
-    model: pin.Model, band: list[Array], planners: tuple[LocalPlanner, TrackedMotions], goals: list[Array]
-) -> list[Array]:
-    """Postures of a band, each nearer to its goal by a step; without goals to between its neighbours."""
-    found = band[:1]
-    for k, (q, after) in enumerate(pairwise(band[1:]), start=1):
-        goal = goals[k] if goals else _between(model, found[-1], q, after)
-        found += [q] if BUDGET.over else _brought(model, (found[-1], q, after), goal, planners)
-    return [*found, band[-1]]
-
-
-def _between(model: pin.Model, before: Array, q: Array, after: Array) -> Array:
-    """The posture (nq,) between two neighbours of q, and on from there."""
-    # by 1.6 of the distance to their mean: 1 converges in twice as many sweeps
-    return np.asarray(pin.interpolate(model, q, pin.interpolate(model, before, after, 0.5), 1.6))
-
-
-def _brought(
-    model: pin.Model, near: tuple[Array, Array, Array], goal: Array, planners: tuple[LocalPlanner, TrackedMotions]
-) -> list[Array]:
-    """Postures in place of the second one of three, near a goal: straight motions join them to the others."""
-    (before, q, after), (local, slides) = near, planners
-    if local.joined(before, goal, np.inf) and local.joined(goal, after, np.inf):
-        return [goal]
-    slid = slides.step(q, goal)
-    sides = list[list[Array]]()
-    for side in (before, after):
-        if local.joined(side, slid, np.inf):
-            sides.append([])
-            continue
-        if length(model, [side, slid]) < 0.2 * APART:
-            return [q]
-        middle = slides.step(slid, np.asarray(pin.interpolate(model, side, slid, 0.5)))
-        if not (local.joined(side, middle, np.inf) and local.joined(middle, slid, np.inf)):
-            return [q]
-        sides.append([middle])
-    return [*sides[0], slid, *sides[1]]
-
-
-def _band(model: pin.Model, path: list[Array], local: LocalPlanner) -> list[Array]:
+def banded(model: pin.Model, path: list[Array], local: LocalPlanner) -> list[Array]:
     """Postures of a path about `APART`, and its own ones between two of them that a straight motion does not join."""
     at = _lengths(model, path)
     places = np.linspace(0.0, at[-1], max(4, int(np.ceil(at[-1] / APART)) + 1))

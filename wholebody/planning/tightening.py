@@ -1,0 +1,156 @@
+"""Paths drawn tight round what is in the way: programs for all postures of a path at once.
+
+A path through postures q_k is displaced by tangents x_k that minimise
+
+    sum_k w_k |q_k+1 - q_k + x_k+1 - x_k|^2 + m sum_k |x_k|^2,   rows_k x_k + gap_k >= 0,
+
+where w_k, the inverse lengths of the motions between, make the first sum the length of the path (iteratively
+reweighted least squares), and rows are those of near pairs, constraints and limits. Free roots are displaced along the
+axes of the world, so that all freedoms share one matrix with a row for each posture. Its inverse is small, and leaves a
+program of the rows alone, whose multipliers Gauss-Seidel finds. Postures then move as far as straight motions between
+them are free. In an elastic band (Quinlan and Khatib 1993) each follows its neighbours alone, and takes tens of sweeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.methods.control import BUDGET
+from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+from wholebody.planning.multiplier_kernel import press
+from wholebody.planning.smoothing import banded, length
+
+DAMPING = 0.005  # m of the first program, and least; larger = shorter displacements, more programs
+
+
+class Program(NamedTuple):
+    """What displaces the postures (nq,) of a path that are not its ends."""
+
+    away: Array  # (n, nv) displacements, along the axes of the world
+    turns: list[Array]  # (nv, nv) axes of each posture's tangent in those of the world
+    foreseen: float  # by how much the path becomes shorter, radians and metres
+
+
+def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: TrackedMotions) -> list[Array]:
+    """A path drawn tight round things, to which few shortcuts lead as they go from one posture to another one."""
+    band, damping = banded(model, path, local), DAMPING
+    while len(band) > 2 and not BUDGET.over:
+        program = _programmed(model, band, slides, damping)
+        if program is None:
+            break
+        moved, cut = _moved(model, band, program, (local, slides))
+        before, after = length(model, band), length(model, moved)
+        better = before - after
+        # what comes much shorter of what was foreseen was displaced too far
+        damping = max(0.5 * damping, DAMPING) if better > 0.25 * program.foreseen else 4.0 * damping
+        band = moved if better > 0.0 else band
+        count = len(band)
+        band = _halved(model, band, cut) if count < 40 else band  # more = nearer to things, dearer
+        if len(band) == count and (0.0 < better < 0.003 * before or damping > 0.5):  # it is tight
+            break
+    found = [band[0]]
+    for q in band[1:]:
+        found += local.joined(found[-1], q, np.inf) or [q]
+    return found
+
+
+def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, damping: float) -> Program | None:
+    """The program of a path as it is; None where time ends before."""
+    turns, rows, gaps, counts = [_turn(model, q) for q in band], list[Array](), list[Array](), list[int]()
+    for q, turn in zip(band[1:-1], turns[1:-1], strict=True):
+        if BUDGET.over:
+            return None
+        row, gap = slides.rows(q)
+        rows.append(row @ turn.T)
+        gaps.append(gap)
+        counts.append(len(gap))
+    ways = np.array([turn @ pin.difference(model, *pair) for turn, pair in zip(turns, pairwise(band), strict=False)])
+    lengths = np.linalg.norm(ways, axis=1)
+    weights = lengths.mean() / np.maximum(lengths, 0.3 * lengths.mean())  # bounded where a motion is short
+    stiff = np.diag(weights[:-1] + weights[1:] + damping) - np.diag(weights[1:-1], 1) - np.diag(weights[1:-1], -1)
+    spread = np.linalg.inv(stiff)
+    free = spread @ (weights[1:, None] * ways[1:] - weights[:-1, None] * ways[:-1])
+    node = np.repeat(np.arange(len(counts)), counts)
+    away = _kept(free, spread, node, (np.concatenate(rows), np.concatenate(gaps)))
+    # rad, m: farther ones lead to things that no row is of
+    away *= min(1.0, 0.4 / max(float(np.linalg.norm(away, axis=1).max()), 1e-15))
+    ends = np.zeros((1, model.nv))
+    after = np.linalg.norm(ways + np.diff(np.vstack([ends, away, ends]), axis=0), axis=1)
+    return Program(away, turns, float(lengths.sum() - after.sum()))
+
+
+def _kept(free: Array, spread: Array, node: Indices, rows: tuple[Array, Array]) -> Array:
+    """Displacements (n, nv) that keep rows (r, nv) with gaps (r,), of nodes (r,), nearest to others that need not."""
+    derivative, gap = rows
+    ahead = np.einsum("ij,ij->i", derivative, free[node]) + gap
+    force, found, asked = np.zeros(len(gap)), free, ahead < 0.0
+    for _ in range(6):  # the last ones seldom find more
+        at = np.flatnonzero(asked)
+        response = spread[np.ix_(node[at], node[at])] * (derivative[at] @ derivative[at].T)
+        given = force[at]
+        press(response, ahead[at], given)
+        force[at] = given
+        pushed = np.zeros_like(free)
+        np.add.at(pushed, node[at], given[:, None] * derivative[at])
+        found = free + spread @ pushed
+        missed = np.einsum("ij,ij->i", derivative, found[node]) + gap < -1e-4
+        if not (missed & ~asked).any():
+            break
+        asked |= missed
+    return found
+
+
+def _moved(
+    model: pin.Model, band: list[Array], program: Program, planners: tuple[LocalPlanner, TrackedMotions]
+) -> tuple[list[Array], list[bool]]:
+    """The displaced path, as far as motions between its postures are free; the path itself where time ends before.
+
+    And which displacements were cut.
+    """
+    (local, slides), count = planners, len(band)
+    share, free, anew = np.ones(count), np.zeros(count - 1, dtype=bool), np.ones(count, dtype=bool)
+    share[[0, -1]] = 0.0
+    moved, cuts = list(band), 0
+    while True:
+        for k in np.flatnonzero(anew[1:-1]) + 1:
+            step = share[k] * (program.turns[k].T @ program.away[k - 1])
+            moved[k] = slides.displaced(band[k], step) if share[k] else band[k]
+        for k in np.flatnonzero(anew[:-1] | anew[1:]):
+            # what is as before need not be proven: steps along things made it
+            free[k] = not (share[k] or share[k + 1]) or bool(local.joined(moved[k], moved[k + 1], np.inf))
+        if BUDGET.over and not free.all():
+            return band, [False] * count
+        if free.all():
+            return moved, (share < 1.0).tolist()
+        anew, cuts = np.zeros(count, dtype=bool), cuts + 1
+        beside = np.flatnonzero(~free)
+        anew[beside] = anew[beside + 1] = True
+        anew &= share > 0.0
+        share[anew] *= 0.4 if cuts < 3 else 0.0
+
+
+def _halved(model: pin.Model, band: list[Array], cut: Sequence[bool]) -> list[Array]:
+    """A path with postures in the middle of long motions beside cut displacements, as rows are those of postures."""
+    found = [band[0]]
+    inner = [False, *cut[1:-1], False]
+    for (q, there), beside in zip(pairwise(band), map(any, pairwise(inner)), strict=True):
+        if beside and length(model, [q, there]) > 0.1:  # rad, m: smaller = nearer to things, dearer
+            found.append(np.asarray(pin.interpolate(model, q, there, 0.5)))
+        found.append(there)
+    return found
+
+
+def _turn(model: pin.Model, q: Array) -> Array:
+    """(nv, nv) axes of the tangent at q (nq,), those of free roots in the axes of the world."""
+    found = np.eye(model.nv)
+    for joint in model.joints:
+        if joint.nv == 6:
+            turn, at = pin.XYZQUATToSE3(q[joint.idx_q : joint.idx_q + 7]).rotation, joint.idx_v
+            found[at : at + 3, at : at + 3] = found[at + 3 : at + 6, at + 3 : at + 6] = turn
+    return found
