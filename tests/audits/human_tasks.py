@@ -182,14 +182,19 @@ def _underside(figure: Figure, sizes: Mapping[str, float]) -> float:
 
 
 def add_seat(scene: Scene, figure: Figure, q: Array) -> float:
-    """Put a stool below who sits, no deeper than the thighs are long; return the height of its top."""
+    """Put a stool below pelvis and thighs of who sits, no deeper than the thighs are long; return its top's height."""
+    import wholebody as wb
+
     sizes, pelvis = measure(figure), figure.placement(q, "pelvis").translation
     top = float(pelvis[2]) + _underside(figure, sizes) - 0.001
     shank = sizes["buttock_knee_length"] - sizes["buttock_popliteal_length"]
     hollow = float(figure.placement(q, "right_knee").translation[0]) - 0.5 * shank  # of the knee
     back, front = float(pelvis[0]) - 0.11, min(float(pelvis[0]) + 0.31, hollow - BEHIND_KNEE)
-    _add_on_legs(scene, "seat", (front - back, 0.5, 0.04), (0.5 * (front + back), 0.0, top - 0.02))
-    return top
+    size, middle = (front - back, 0.5, 0.04), 0.5 * (front + back)
+    alone = wb.Scene(figure).add(wb.Box(size), name="seat", at=(middle, 0.0, top - 0.02))
+    lower = float(alone.contacts(q, within=0.001).distance.min(initial=0.001)) - 0.001  # thighs of the heavy hang
+    _add_on_legs(scene, "seat", size, (middle, 0.0, top + lower - 0.02))
+    return top + lower
 
 
 def _add_on_legs(scene: Scene, name: str, size: Sequence[float] | Array, at: tuple[float, float, float]) -> None:

@@ -6,10 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.starts import Minima, alike, restarts, throughout
+from wholebody.methods.starts import Minima, alike, crouched, restarts, throughout
 
 
 def descents_needed(values, fewest: int = 0) -> int:
@@ -101,3 +102,45 @@ def test_a_joint_without_limits_starts_anywhere(problem: wb.Problem) -> None:
         found = angles(problem, restarts(problem, workspace.state, problem.start, np.random.default_rng(0), 120))
     assert found[:, 1].min() < -2.5
     assert found[:, 1].max() > 2.5
+
+
+def squats(problem: wb.Problem) -> np.ndarray | None:
+    with problem.borrow() as workspace:
+        return crouched(problem, workspace.state, problem.start)
+
+
+def test_who_balances_squats_where_the_start_is_and_looks_where_it_looks() -> None:
+    human = wb.load("human")
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    turn = pin.SE3(pin.utils.rotate("z", 2.0), np.array((3.0, -1.0, 0.0)))
+    start, expected = human.posture("standing"), human.posture("squatting")
+    start[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(start[:7]))
+    found = squats(wb.Problem(scene, start, constraints=[wb.Stand("floor")]))
+    assert found is not None
+    np.testing.assert_allclose(found[7:], expected[7:], atol=1e-9)
+    assert pin.XYZQUATToSE3(found[:7]).isApprox(turn * pin.XYZQUATToSE3(expected[:7]), 1e-9)
+
+
+def test_of_two_people_the_one_who_balances_squats_and_what_is_frozen_stays() -> None:
+    scene = wb.Scene({"anna": wb.load("human", sex="female"), "ben": wb.load("human")})
+    scene.add(wb.HalfSpace(), name="floor")
+    feet = wb.Stand("floor", feet=["anna/left_foot", "anna/right_foot"])
+    problem = wb.Problem(scene, constraints=[feet, wb.Freeze("anna/left_arm")])
+    found, figure = squats(problem), scene.figure
+    assert found is not None
+    np.testing.assert_array_equal(figure.part("ben", found), figure.part("ben", problem.start))
+    still = [figure.model.joints[figure.joint_id(name)].idx_q for name in figure.joint_names("anna/left_arm")]
+    np.testing.assert_array_equal(found[still], problem.start[still])
+    assert figure.joint_values(found)["anna/left_knee_flexion"] > 1.5
+
+
+def test_nobody_squats_who_sits_kneels_or_holds_on() -> None:
+    human = wb.load("human")
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    shanks = ["left_shank", "right_shank"]
+    for constraint in (
+        wb.Stand("floor", balance=False),
+        wb.Stand("floor", feet=shanks, knees=shanks),
+        wb.Hold("pelvis"),
+    ):
+        assert squats(wb.Problem(scene, constraints=[constraint])) is None

@@ -61,6 +61,15 @@ def test_each_posture_is_of_the_lower_family_wherever_the_first_jump_was(turned_
     assert next(iter(changed.values())).startswith("hinge by 1")
 
 
+def test_a_case_solved_from_its_own_start_leads_out_of_a_higher_family_that_does_not_jump() -> None:
+    asked: Counter[int] = Counter()
+    given = family([1.0] * len(TILTS), -0.5, asked)
+    assert not lower(given, [15])
+    for k, tilt in enumerate(TILTS):
+        assert given.done[k].q == pytest.approx(GRID[well(GRID, tilt).argmin()], abs=2e-3)
+    assert max(asked.values()) <= TRIES
+
+
 def test_a_posture_that_changes_continuously_costs_no_more_solves() -> None:
     asked: Counter[int] = Counter()
     given = family([1.0] * len(TILTS), 0.5, asked)

@@ -16,7 +16,10 @@ from wholebody.methods.contradictions import Contradiction
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import allowed
+from wholebody.tasks.checks import is_a
+from wholebody.tasks.defaults import UPRIGHT
 from wholebody.tasks.grasp import Grasp
+from wholebody.tasks.inputs import body_of
 
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
@@ -119,6 +122,24 @@ def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array
         if angles.keys() <= set(figure.joints):
             move = pin.difference(figure.model, start, figure.with_joints(start, angles))
             yield _moved(problem, state, start, move)
+
+
+def crouched(problem: Problem, state: State, start: Array) -> Array | None:
+    """The start (nq,) with everybody who keeps balance on two feet in the posture "squatting"; None with nobody."""
+    figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
+    upright = [term for term in problem.constraints if is_a(term, UPRIGHT) and getattr(term, "balance", True)]
+    for term in upright:
+        body = body_of(problem.scene, term.feet)
+        name, root = f"{body}squatting", figure.roots.get(f"{body}root")
+        if name not in figure.postures or root is None or getattr(term, "knees", None):
+            continue
+        low, idx = figure.posture(name), int(figure.model.joints[root].idx_q)
+        begun, usual, placed = (pin.XYZQUATToSE3(q[idx : idx + 7]) for q in (start, figure.neutral, low))
+        low[idx : idx + 7] = pin.SE3ToXYZQUAT(begun * usual.inverse() * placed)
+        own = [figure.model.joints[joint] for joint in figure.bodies[str(body)]]
+        dofs = np.concatenate([np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in own])
+        move[dofs] = pin.difference(figure.model, start, low)[dofs]
+    return _moved(problem, state, start, move) if move.any() else None
 
 
 def throughout(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:

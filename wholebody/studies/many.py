@@ -98,10 +98,10 @@ def solve_many(
         warm_start: begin each problem at the answer of the last one before it that is solved, if of the same figure.
             One that is not solved from there is solved from its own start, and so are goals of arms that are answered
             many at a time: the least of their branches is known at once. Runs of 16 problems in the order given are
-            linked so, and their first ones, whatever `jobs` is. Where neighbours differ by more than 10 degrees in a
-            joint, both are solved from their own starts and each other's answers, and the lower measure stays: at most
-            four more solves of a problem. `SolveRecord.change` names the jumps that are left. An answer may be another
-            local solution than without.
+            linked so, and their first ones, whatever `jobs` is. The middle one of each run is solved from its own start
+            too. Where neighbours differ by more than 10 degrees in a joint, both are solved from each other's answers,
+            then from their own starts, and the lower measure stays: at most four more solves of a problem.
+            `SolveRecord.change` names the jumps that are left. An answer may be another local solution than without.
         seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
         folder: keeps the records (`records.jsonl`). What it holds already of the same problem and method is not solved
             again: a run that was ended goes on. Made if it does not exist.
@@ -179,7 +179,10 @@ def run_cases(
         family = Family(order, done, partial(_computed, order, running), keep, settled)
         starts = {k: _solved_before(k, run, done) for run in (*leading, *linked) for k in run[1:]}
         before_it = {k: j for k, j in starts.items() if j is not None}
-        _ = solve_from_neighbours(family, before_it) or (linked and lowers and (lower(family) or name_changes(family)))
+        middles = [run[len(run) // 2] for run in linked]  # far from the own start that began all of them
+        _ = solve_from_neighbours(family, before_it) or (
+            linked and lowers and (lower(family, middles) or name_changes(family))
+        )
     return Records([done.get(k, order[k].record) for k in range(len(order))])
 
 

@@ -71,12 +71,12 @@ def _nearest(solved: Indices, distances: Indices, tried: Mapping[int, int], most
     return (j, distance) if len(tried) < most or distance < min(tried.values()) else None
 
 
-def lower(family: Family) -> bool:
-    """Solve the cases beside a jump (`JUMP`) again, also from the answers of all neighbours; whether the caller ended.
+def lower(family: Family, first: Sequence[int] = ()) -> bool:
+    """Solve cases again where postures are not, or no longer, of the lowest family; whether the caller ended the run.
 
-    A warm start may follow a family of postures that is no longer the lowest, and an own start lead to a worse one: the
-    lower spreads from case to case, each at most `TRIES` times. A round takes the answers of the one before, so the
-    order in which solves end does not matter.
+    Those of `first` from their own starts, then those beside a jump (`JUMP`) from the answers of all neighbours and, if
+    these are of no use, from their own: the lower spreads from case to case, each at most `TRIES` times. A round takes
+    the answers of the one before, so the order in which solves end does not matter.
     """
     order, done, compute, keep = family[:4]
     pairs = _neighbours(order)
@@ -86,17 +86,17 @@ def lower(family: Family) -> bool:
         beside[b].append(a)
     tried: dict[int, set[tuple[int, bytes]]] = {k: set() for k in beside}
     while True:
+        asked = {*first} or {k for pair in pairs if _jumps(done, *pair) for k in pair}
         work: dict[tuple[int, int], tuple[int, Array | None]] = {}
-        for k in sorted(
-            {k for pair in pairs if _jumps(done, *pair) for k in {*pair} - family.settled if done[k].measure}
-        ):
-            for j in (-1, *(j for j in beside[k] if _alike(done, k, j))):
-                q = None if j < 0 else done[j].q
-                mark = j, b"" if q is None else q.tobytes()
+        for k in sorted(k for k in asked - family.settled if k in done and done[k].solved and done[k].measure):
+            near = [] if first else [j for j in beside[k] if _alike(done, k, j)]
+            marks = {j: (j, done[j].q.tobytes()) for j in near}  # type: ignore[union-attr]
+            new = {j: mark for j, mark in marks.items() if mark not in tried[k]} or {-1: (-1, b"")}
+            for j, mark in new.items():
                 if mark not in tried[k] and len(tried[k]) < TRIES:
                     tried[k].add(mark)
-                    work[k, j] = k, q
-        if not work:
+                    work[k, j] = k, None if j < 0 else done[j].q
+        if not (work or first):
             return False
         best: dict[int, tuple[float, int]] = {}
         found = compute(solve_from, work)
@@ -109,6 +109,7 @@ def lower(family: Family) -> bool:
                 neighbour = "" if j < 0 else order[j].record.name
                 if keep(k, replace(order[k].record, **found[k, j], neighbour=neighbour)):
                     return True
+        first = ()
 
 
 def name_changes(family: Family) -> bool:

@@ -362,3 +362,22 @@ def test_a_descent_that_runs_out_of_programs_ends_on_its_constraints(human: wb.F
         for q in (start, solution.q)
     ]
     np.testing.assert_allclose(apart[1], apart[0], atol=1e-5)
+
+
+@pytest.mark.parametrize("percentile", [50])
+def test_who_takes_a_box_from_the_floor_squats_with_both_knees_outward(percentile: int, honest) -> None:
+    """From upright nothing leads down, and other starts end with a knee straight or inward: each person another way."""
+    person = wb.load("human", percentile=percentile)
+    scene = wb.Scene(person).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.30, 0.32, 0.24)), name="box", at=(0.45, 0.0, 0.1205))
+    goals = []
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        goals += [wb.Point(f"{side}_palm", (0.45, 0.1605 * sign, 0.1205))]
+        goals += [wb.Axis(f"{side}_palm", (0, 0, 1), direction=(0, -sign, 0), weight=0.1)]
+        goals += [wb.Axis(f"{side}_palm", (1, 0, 0), direction=(1, 0, 0), weight=0.1)]
+    problem = wb.Problem(scene, goals=goals, constraints=[wb.Stand("floor")])
+    solution = honest(problem, wb.solve(problem))
+    assert solution.status == "solved"
+    angles = person.joint_values(solution.q)
+    assert min(angles[f"{side}_knee_flexion"] for side in ("left", "right")) > np.radians(60.0)
+    assert min(angles[f"{side}_hip_abduction"] for side in ("left", "right")) > np.radians(10.0)

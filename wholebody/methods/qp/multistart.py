@@ -21,7 +21,7 @@ from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
-from wholebody.methods.starts import Attempt, Minima, alike, hooked_hands, restarts, throughout
+from wholebody.methods.starts import Attempt, Minima, alike, crouched, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Effort
@@ -72,6 +72,9 @@ class QPMultistart(Search):
         yield Attempt(begin, self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
+        if (low := crouched(self.problem, self.lineariser.state, self._start)) is not None:
+            missed = [float(np.linalg.norm(self.lineariser.at(q, 0.0).goal_error)) for q in (low, self._start)]
+            yield Attempt([low] if missed[0] < missed[1] else [], self.directly, "from a squat")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
