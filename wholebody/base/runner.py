@@ -94,18 +94,13 @@ class Child:
         self._process: subprocess.Popen[bytes] | None = None
         self._output: IO[bytes] | None = None
         self._connection: Connection | None = None
-        self._job: Job | None = None
+        self.job: Job | None = None  # that it does; None if it is idle
         self._notes: list[Any] = []
 
     @property
     def process(self) -> int | None:
         """Id of the process; None if none runs."""
         return None if self._process is None else self._process.pid
-
-    @property
-    def job(self) -> Job | None:
-        """The job that it does; None if it is idle."""
-        return self._job
 
     @property
     def connection(self) -> Connection:
@@ -124,7 +119,7 @@ class Child:
 
     def begin(self, job: Job) -> None:
         """Send a job; `listen` returns its outcome."""
-        self._job, self._notes = job, []
+        self.job, self._notes = job, []
         if self._process is None:
             self._process, self._connection, self._output = start_process(os.environ | self._environment)
         try:
@@ -134,16 +129,16 @@ class Child:
 
     def listen(self) -> Outcome | None:
         """Wait for the next message of a job: its outcome, or None after a note."""
-        assert self._job is not None
+        assert self.job is not None
         try:
             last, value = self.connection.recv()
         except (EOFError, ConnectionResetError):
-            job, error = self._job, self._ended()
+            job, error = self.job, self._ended()
             return Outcome(job, tuple(self._notes), None, error)
         if not last:
             self._notes.append(value)
             return None
-        job, self._job = self._job, None
+        job, self.job = self.job, None
         return Outcome(job, tuple(self._notes), value, None)
 
     def close_if_full(self) -> None:
@@ -159,7 +154,7 @@ class Child:
         for stream in (self._connection, self._output):
             if stream is not None:
                 stream.close()
-        self._process = self._output = self._connection = self._job = None
+        self._process = self._output = self._connection = self.job = None
 
     def _ended(self) -> EndedError:
         assert self._process is not None

@@ -37,9 +37,6 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
         path: of the file; its folder must exist.
         title: one line; the name of the file if left out.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: a figure that was not loaded or was reduced, or a term, measure or shape that task files do not
             have, or no measures but `Soft`; or the file cannot be written or does not end in .toml.

@@ -152,9 +152,10 @@ class Bodies:
             self.all.append(Body(carrier, path, int(piece.parentJoint), thing, color, plate, corners))
         self.carriers = {body.carrier: body.joint for body in self.all}
         self.pieces = pieces
-        self._drawn = () if pieces else tuple(self._drawn_figures())
+        # the figures of which a surface or visuals are drawn in place of pieces
+        self.drawn = () if pieces else tuple(self._drawn_figures())
         self._owned = frozenset(
-            owner for owner in scene.piece_owner for figure in self._drawn if figure.owns(owner, numbers)
+            owner for owner in scene.piece_owner for figure in self.drawn if figure.owns(owner, numbers)
         )
         self._patches: list[tuple[str, Skinned]] = []
         shown = [index for index, body in enumerate(self.all) if body.thing is not None and not self.hidden(index)]
@@ -212,7 +213,7 @@ class Bodies:
         graph.remove(LOOK.figure_node)
         graph.remove(LOOK.object_node)
         self._patches = [
-            (f"{figure.prefix}{patch.segment}", patch) for figure in self._drawn for patch in figure.build(graph)
+            (f"{figure.prefix}{patch.segment}", patch) for figure in self.drawn for patch in figure.build(graph)
         ]
         for index, piece in enumerate(self.scene.geometry.geometryObjects):
             body = self.all[index]
@@ -232,11 +233,6 @@ class Bodies:
             grid[:3, 3] += grid[:3, 2] * LOOK.plate[2] / 2
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
-
-    @property
-    def drawn(self) -> tuple[DrawnFigure, ...]:
-        """The figures of which a surface or visuals are drawn in place of pieces."""
-        return self._drawn
 
     def hidden(self, index: int) -> bool:
         """Whether a piece is not drawn: the surface of its body is, or it is an outer piece, which has no opacity."""
@@ -278,7 +274,7 @@ class Bodies:
     def ghost(self, graph: SceneGraph, number: int, data: Any, color: Color) -> None:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
         root = f"{LOOK.ghost_node}/{number}"
-        for figure in self._drawn:
+        for figure in self.drawn:
             figure.build(graph, root, color)
             for path in figure.nodes.values():
                 graph.place(f"{root}{path}", data.oMi[self.carriers[path]].homogeneous)

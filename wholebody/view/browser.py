@@ -177,12 +177,12 @@ class Browser:
 
         return value
 
-    def capture(self, first: str = "0", *, legend: bool = False) -> bytes:
-        """PNG of the drawing without controls, after JavaScript that comes first; with the panel in a corner or not."""
-        return self.capturing(first, legend=legend)()
+    def capture(self, first: str = "0") -> bytes:
+        """PNG of the drawing without controls and panel, after JavaScript that comes first."""
+        return self.capturing(first)()
 
     def capturing(self, first: str = "0", *, legend: bool = False) -> Callable[[], bytes]:
-        """Begin to `capture`, and return the function that waits for the PNG."""
+        """Begin to `capture`, with the panel in a corner or not, and return the function that waits for the PNG."""
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
         data = self._begin(f"{first}; wholebody.capture({json.dumps(legend)})")

@@ -319,9 +319,6 @@ class Viewer:
             legend: whether the page's panel stands in the corner where it hides least of the figure. It is left out
                 where it would be wider or higher than 45 % of the picture.
 
-        Returns:
-            The path.
-
         Raises:
             InputError: nothing is shown yet, the size is out of range, or the file is no .png or cannot be written.
             MissingPackageError: there is no Chromium.
@@ -349,9 +346,6 @@ class Viewer:
             size: width and height, pixels.
             fps: pictures per second; by default the motion's own, at most 25 in a GIF and 30 in an MP4.
             progress: called after each picture with the numbers of drawn and of all pictures.
-
-        Returns:
-            The path.
 
         Raises:
             InputError: no motion is shown, the ending is another, or a number is out of range.

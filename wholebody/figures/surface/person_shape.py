@@ -76,7 +76,6 @@ class PersonShape:
         self._scale = person.stature / 1.75  # lengths below are of a person of 1.75 m
         self.solids: tuple[Solid, ...] = tuple(one for one in spec.solids if not one.name.endswith(f"_thigh:{SPREAD}"))
         self.bind = {name: np.array(data.oMf[figure.frame_id(name)].homogeneous) for name in figure.segments}
-        self._marks = {name: np.array(data.oMf[figure.frame_id(name)].translation) for name in figure.frames}
         pieces = [
             placed(piece_field(solid), self.bind[solid.segment]) for solid in self.solids if solid.segment in TRUNK
         ]

@@ -40,6 +40,7 @@ class Robot:
     Attributes:
         wrapper: the placo.RobotWrapper.
         frames: the frames that tasks can name -> the index of the joint and the placement in it.
+        floating: whether placo's base moves, as the one free root.
     """
 
     def __init__(self, figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
@@ -52,18 +53,13 @@ class Robot:
             raise MissingPackageError(
                 f"placo cannot be imported ({error}); install what it was built for: pip install 'wholebody[placo]'"
             ) from None
-        self.frames, self._floating, self._roots = dict(frames), figure.root == "free", _jointed(figure)
+        self.frames, self.floating, self._roots = dict(frames), figure.root == "free", _jointed(figure)
         self._clearances = np.zeros(0)
         self._pairs = np.zeros(0, dtype=np.intp)
         text = ElementTree.tostring(_skeleton(figure, self.frames), encoding="unicode")
         self.wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
         self._copy_model(figure)
         self._pieces: list[int] = []
-
-    @property
-    def floating(self) -> bool:
-        """Whether placo's base moves, as the one free root."""
-        return self._floating
 
     def move(self, q: Array) -> None:
         """Move to our posture q (nq,)."""

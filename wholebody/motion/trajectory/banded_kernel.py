@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.base.compiled import compiled
+from wholebody.base.compiled import compiled, with_loops
 
 
 @compiled(fastmath=True)
@@ -25,9 +24,8 @@ def add_rows(band: Array, first: Indices, begins: Indices, values: Array, weight
                     band[column, to - at] += scaled * values[to]
 
 
-def compiled_kernel() -> ModuleType:
+@with_loops(__name__)
+def compiled_kernel(_: Any) -> None:
     """This module, with its loops compiled or loaded from the cache."""
-    none, places, band = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 1))
-    begins = np.zeros(1, dtype=np.intp)
-    add_rows(band, places, begins, none, none)
-    return sys.modules[__name__]
+    none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
+    add_rows(np.zeros((1, 1)), places, np.zeros(1, dtype=np.intp), none, none)
