@@ -20,7 +20,6 @@ MODULES = {row["name"]: row["module"] for row in _ROWS if row["module"]}
 EXTRAS = {row["name"]: row["extra"] for row in _ROWS if row["extra"]}
 """Optional packages: distribution -> the extra that installs it."""
 
-OLDEST, NEWEST = (3, 10), (3, 14)
 LIBRARIES = ("libpinocchio", "libcoal", "libhpp-fcl", "libeigenpy", "libboost_python", "liburdfdom", "libassimp")
 """Shared libraries of which other versions break those of the wheels."""
 
@@ -103,7 +102,7 @@ def shadow(distribution: Distribution, file: str) -> str | None:
 
 def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
     """Say what is wrong with the interpreter's version, if anything."""
-    if OLDEST <= version <= NEWEST:
+    if (3, 10) <= version <= (3, 14):
         return None
     return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.14, for which the required packages exist"
 

@@ -378,6 +378,5 @@ def _grade(angle: float, *bounds: float) -> int:
 
 def _turned(*angles: float) -> int:
     """How many of some angles, to one or the other side, count as turned."""
-    # from which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10
-    # degrees "not clearly visible"
+    # a trunk or neck is twisted or bent sideways: EN 1005-4 (2005) calls up to 10 degrees "not clearly visible"
     return sum(abs(angle) > radians(10.0) for angle in angles)

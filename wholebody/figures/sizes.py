@@ -26,10 +26,6 @@ THUMB_TIP = 0.675
 STRETCH = (5.0, 85.0)
 """Degrees by which the clavicle can rise, in the least and the most mobile people. An overhead reach says it."""
 
-FOLLOWS, STRETCHED, STATED = 0.003, 0.010, 0.0001
-"""Metres: standard deviations of dimensions of the arms that follow from others, of an overhead reach that does, and of
-those that were stated."""
-
 
 class TrunkPart(NamedTuple):
     """A slice of the trunk."""
@@ -109,8 +105,9 @@ def arm_sizes(
     names, terms = list(sums), np.array([row for row, _ in sums.values()], dtype=float)
     known = np.array([constant for _, constant in sums.values()])
     wanted = np.array([of[name] for name in names]) - known
-    free = {"overhead_reach_sitting": STRETCHED}
-    unit = np.array([STATED if name in stated else free.get(name, FOLLOWS) for name in names])
+    # m: standard deviations of an overhead reach and of others that follow, and of those that were stated
+    free = {"overhead_reach_sitting": 0.010}
+    unit = np.array([0.0001 if name in stated else free.get(name, 0.003) for name in names])
     left = np.concatenate([wanted / unit, usual / spread])
     rows_of = np.vstack([terms / unit[:, None], np.diag(1.0 / spread)])
     found = np.linalg.lstsq(rows_of, left, rcond=None)[0]

@@ -124,12 +124,6 @@ def object_penetrations(
 
 
 TOUCHING = 1e-7  # overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`
-
-
-MOST_DESCENTS, MOST_ROWS = 30, 40
-"""Most rounds of a local search, and rows of its QP; both are far fewer unless rounding causes cycles."""
-
-
 SHORTEST = 2e-4  # least step of a march along a ray, metres; narrower free gaps may be missed
 
 
@@ -275,7 +269,7 @@ def _first_free(pairs: ObjectPair, direction: Array, reach: float) -> Array | No
 def _descent(pairs: ObjectPair, translation: Array) -> Array:
     """Shorten a translation that separates, keeping every pair on its sides of the plane that now separates it."""
     # Each plane is a sufficient condition: the QP with all is feasible, and its answer separates and is no longer.
-    for _ in range(MOST_DESCENTS):
+    for _ in range(30):  # far fewer unless rounding causes cycles
         sides = pairs.between(translation)
         if sides is None:
             return translation
@@ -291,7 +285,7 @@ def _descent(pairs: ObjectPair, translation: Array) -> Array:
 def _least_under(sides: Sides) -> Array | None:
     """The QP  min |t|^2,  normals t >= offsets: the most violated row is added until none is violated."""
     answer, normals, offsets = np.zeros(3), np.zeros((0, 3)), np.zeros(0)
-    for _ in range(MOST_ROWS):
+    for _ in range(40):  # rows; far fewer unless rounding causes cycles
         slack = sides.normals @ answer - sides.offsets
         worst = int(np.argmin(slack))
         if slack[worst] >= -1e-10:

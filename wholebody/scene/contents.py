@@ -25,7 +25,6 @@ from wholebody.scene.matter.body import material as to_material
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a smaller unit, unless it is a thin floor
 DIVIDE = "divide millimetres by 1000, centimetres by 100"
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
@@ -324,7 +323,7 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
     if (far := max(map(abs, place.translation.tolist()))) > 100.0:
         checks.warn(f"{name!r} is {far:.4g} m away; lengths are in metres, so {DIVIDE}")
     extent = _extent(shape)
-    if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:
+    if max(extent) > 100.0 and min(extent) > 2.0:  # m: probably in a smaller unit; a thin floor may be as wide
         size = " x ".join(f"{length:.4g}" for length in extent)
         correction = "wb.Mesh(..., scale=0.001) reads millimetres" if isinstance(shape, Mesh) else DIVIDE
         checks.warn(f"{name!r} measures {size} m; lengths are in metres: {correction}")

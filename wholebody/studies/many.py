@@ -253,9 +253,8 @@ def _answers(
     if running.cluster is None and _is_quick(cases, running):
         yield from shared(keys, running.jobs, here, there)
         return
-    # Several in a job, since each job has its scene with it; those of a job whose process ended are done one by one. A
-    # deadline is of one.
-    # 16 cases of a job; more: fewer scenes are sent, and processes end less together. Keys are of runs of cases.
+    # Up to 16 in a job, since each has its scene with it; those of a job whose process ended are done one by one. A
+    # deadline is of one. More: fewer scenes are sent, processes end less together. Keys are of runs of cases.
     most = 16 * len(keys) // max(1, len(cases))
     size = 1 if running.seconds else max(1, min(most, len(keys) // (4 * running.jobs)))
     alone = list[list[Any]]()

@@ -25,8 +25,7 @@ class CCDStrategy:
 
     def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
         self.scene = scene
-        # largest velocity, rad/s and m/s, with which a joint moves away from the tracked one or returns to it: fast
-        # enough to return from 2 rad in half a second, and slow enough not to look like a jump
+        # rad/s and m/s: fast enough to return from 2 rad in half a second, slow enough not to look like a jump
         self._largest_motion = largest_motions(scene, 4.0 * dt, 2.0 * dt)
         self._tracked = shown
         self._rng = np.random.default_rng(seed)
@@ -93,9 +92,8 @@ class RigidTranslation:
         turn = pin.Quaternion(q[3:7]).toRotationMatrix()
         for out in self._out:
             way[:3] -= min(0.0, float(way[:3] @ (turn.T @ out))) * (turn.T @ out)
-        # largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's
-        # top, a finger), so that it does not leave them on the other side
-        # rad: largest rotation of the hand in one step
+        # steps of 10 mm and 0.1 rad: less than half the width of thin pieces (a table's top, a finger), to the far
+        # side of which the hand would leave
         long = max(float(np.linalg.norm(way[:3])) / 0.01, float(np.linalg.norm(way[3:6])) / 0.1, 1.0)
         way[:6] /= long
         way[6:] = 0.0

@@ -102,8 +102,7 @@ class QPStrategy:
         q = shown
         candidates: list[Array] = []
         path: list[tuple[float, Array]] = []
-        # Most programs a frame. One is enough without contact; the second corrects the second-order error of
-        # the first. More would converge in fewer frames and take longer in each.
+        # One program is enough without contact, the second corrects its second-order error; more take longer.
         while len(candidates) < 2:
             step = self._tracker.step(q)
             # steps of a root that turns do not add, and rows of cones are exact to first order only
@@ -169,8 +168,7 @@ class Entanglement:
             elif not self._frames % 10:  # frames after which the other limb gives way instead
                 self._giving = 1 - self._giving
             self._frames += 1
-            # Weight of a limb that gives way, relative to the others. Damping slows it down in
-            # proportion: with 0.01 it comes back in a second only after it was pushed aside.
+            # damping slows it down in proportion: with 0.01 it comes back in a second only after it was pushed aside
             factors[self._dofs[self._holding[self._giving]]] = 0.1
         else:
             self._frames = 0
@@ -190,9 +188,7 @@ class Entanglement:
         dofs = np.concatenate([self._dofs[limb] for limb in pair])
         was, now = (np.abs(pin.difference(self._model, q, tracked))[dofs] for q in (before, shown))
         possible = np.minimum(was, self._largest_motion[dofs]).max()
-        # distance of a degree of freedom from its tracked value, radians and metres, below which nothing
-        # holds it back: the clearance keeps it off by less
-        # Share of the possible approach of a frame below which limbs in contact hold each other. More lets
-        # limbs give way that only slide along each other.
+        # rad, m: the clearance keeps it off by less. Limbs in contact hold each other that come nearer by less than a
+        # share of what a frame allows; more lets limbs give way that only slide along each other.
         held = now.max() > 0.05 and was.max() - now.max() < 0.2 * possible
         self._holding = pair if held else None

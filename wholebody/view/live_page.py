@@ -86,9 +86,7 @@ class LivePage:
         self._loop.join(timeout=5.0)
         ending = threading.Thread(target=self.server.stop, name="wholebody drag ends", daemon=True)
         ending.start()
-        # s: how long the server is waited for; open tabs keep it for 6 s, in threads that end with
-        # the process
-        ending.join(timeout=1.0)
+        ending.join(timeout=1.0)  # s: open tabs keep the server for 6 s, in threads that end with the process
 
     def serve(self) -> None:
         """Wait until the page is stopped or Ctrl-C, then end it."""

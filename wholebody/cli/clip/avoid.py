@@ -27,12 +27,10 @@ from wholebody.motion.strength import Strength
 from wholebody.motion.worn_equipment import put_on
 from wholebody.view.motion_curves import motion_curves
 
-METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
-
 
 def run(arguments: argparse.Namespace) -> int:
     """Free the clips, write them, and say what was found."""
-    methods, worn = arguments.method or [METHOD], arguments.equipment or [WORN]
+    methods, worn = arguments.method or ["trajectory"], arguments.equipment or ["nothing"]
     if len(arguments.files) * len(methods) * len(worn) > 1:
         return _batch(arguments, methods, worn)
     (file,) = arguments.files
@@ -100,7 +98,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
         raise InputError("--html is for one motion with one equipment by one method; give one of each")
     if arguments.scene is not None:
         raise InputError("--scene is for one motion with one equipment by one method; give one of each")
-    folder = arguments.out or Path(FOLDER)
+    folder = arguments.out or Path("freed")
     avoiders = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:

@@ -62,8 +62,7 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
     cell = 1.6 * np.median(np.linalg.norm(edges, axis=-1))  # 2 saves no more time and loses eyes and lips
     across = np.cross(edges[:, 1], edges[:, 2])
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-    # cosine of the angle between a triangle and the normal at its corner, below which the corner is on a sharp
-    # edge
+    # cosine of the angle between a triangle and the normal at a corner that is on a sharp edge
     turned = np.einsum("fi,fki->fk", across, surface.normals[faces]) < 0.3
     sharp = np.unique(faces[turned])
     # Of a wall and the cap at its edge each keeps its own vertices: a common one would be behind the wall.
@@ -157,8 +156,7 @@ def _slopes(field: Field, points: Array, values: Array) -> Array:
 
 def _moved(field: Field, vertices: Array, cell: float) -> Array:
     start, points = vertices, vertices
-    # steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the
-    # error
+    # the fields are nearly distances, so a step towards the surface removes most of the error
     for _ in range(2):
         values = field(points)
         slopes = _slopes(field, points, values)
@@ -188,8 +186,7 @@ def _on_edges(
     for number, cut in enumerate(cuts):
         passed = near[kinds[:, 0] & kinds[:, 1 + number]]
         points = _nearest_on_both(body, cut, middles[passed])
-        # largest step of the cells' size, along an axis: where the edge of a cut is farther from the
-        # middle of a cell, its vertex stays
+        # where the edge of a cut is farther from the middle of a cell than its size, its vertex stays
         kept = np.abs(points - middles[passed]).max(axis=1) < cell
         yield passed[kept], points[kept]
 

@@ -48,8 +48,7 @@ def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = Non
         rows = sp.diags(loads.speed) @ sp.eye(count, format="csr")[loads.frame] + sp.diags(loads.change) @ rate
         ahead = np.asarray(rows @ np.ones(count)).ravel() + loads.gap  # of b = 1
         slacks = len(loads.gap)
-        # shortfalls are weighed by 1e3, so that loads are met where the largest slowing lets them be; their curvature
-        # keeps equal splits unique
+        # a weight of 1e3 of shortfalls meets loads where the largest slowing lets them be; equal splits are unique
         P = sp.block_diag([bands, sp.eye(slacks)])
         c = np.concatenate([c, np.full(slacks, 1e3)])
         G, lower = sp.hstack([-rows, sp.eye(slacks)]), -ahead

@@ -91,8 +91,7 @@ class Loop(Outside[Stepper], ABC):
         if before is None or before.shape != places.shape:
             return self._kept
         moved = float(np.linalg.norm(places - before, axis=1).max(initial=0.0))
-        # Where things move, pairs keep 2 cm beyond their clearances, pink's default, and 1.5 times as
-        # far as a thing moved in a frame.
+        # Where things move, pairs keep pink's default of 2 cm, and 1.5 times as far as a thing moved in a frame.
         self._kept = max(self._kept, 0.02, 1.5 * moved) if moved else self._kept
         return self._kept
 

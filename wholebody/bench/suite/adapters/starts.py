@@ -110,8 +110,7 @@ def starts(problem: Problem) -> Iterator[Array]:
             failures = 0 if _depth(workspace, start) <= deepest else failures + 1
             if not failures:
                 yield start
-            # Random postures that are looked at for one start that is free of overlap; the next one is drawn if none
-            # is.
+            # of 40 random postures none is free of overlap: the next one is drawn
             elif failures == 40:
                 return
 
