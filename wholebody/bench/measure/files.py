@@ -235,8 +235,6 @@ WEIGHTS = {
     "knee": ((0.0, 10.0), (10.0, 5.0)), "ankle": ((50.0, 10.0), (50.0, 10.0)), "shoulder": ((0.0, 100.0), (5.0, 100.0)),
     "elbow": ((0.0, 10.0), (10.0, 5.0)), "wrist": ((0.0, 10.0), (10.0, 5.0)),
 }  # fmt: skip
-DAMPING, MOST, GAIN = 0.5, 10, 1e-3  # of a step; largest number of further steps; least decrease of the error in each
-FIRST = 20  # iterations for the first frame before the motion begins, so that the approach is not judged
 
 
 class MinkRetargeting:
@@ -264,7 +262,7 @@ class MinkRetargeting:
         if figure.root == "free":
             start[:7] = pin.SE3ToXYZQUAT(pin.SE3(self._targets["pelvis"][1][0], self._targets["pelvis"][0][0]))
         self._configuration.update(self._order.theirs(start))
-        for _ in range(FIRST):
+        for _ in range(20):  # before the motion begins, so that the approach is not judged
             self.frame(0)
 
     def _tasks(self, used: list[str], stage: int) -> list[tuple[str, str, object]]:
@@ -288,11 +286,11 @@ class MinkRetargeting:
                 rotation = self._mink.SO3.from_matrix(turn)
                 task.set_target(self._mink.SE3.from_rotation_and_translation(rotation, place))  # type: ignore[attr-defined]
             before = self._error(tasks)
-            for _ in range(1 + MOST):
-                step = self._mink.solve_ik(self._configuration, tasks, self._dt, "daqp", DAMPING)
+            for _ in range(1 + 10):  # further steps
+                step = self._mink.solve_ik(self._configuration, tasks, self._dt, "daqp", 0.5)
                 self._configuration.integrate_inplace(step, self._dt)
                 after = self._error(tasks)
-                if before - after <= GAIN:
+                if before - after <= 1e-3:  # of the error
                     break
                 before = after
         return self._order.ours(np.array(self._configuration.q))

@@ -25,7 +25,6 @@ from wholebody.tasks import Point
 from wholebody.tracking.drag import Drag
 
 INSIDE = 1e-4  # m: deeper than this is inside
-PARTS = 41  # postures of a motion at which its depth is measured
 
 
 @dataclass(frozen=True)
@@ -227,7 +226,7 @@ def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tu
     if contact is None or not contact.certain:
         return 0.0, ""
     deepest = depth
-    for share in np.linspace(0.0, 1.0, PARTS):
+    for share in np.linspace(0.0, 1.0, 41):
         found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, after, float(share))), within=0.0)
         deepest = max(deepest, float(-found.distance.min(initial=0.0)))
     return deepest, " and ".join(scene.piece_owner[piece] for piece in contact.pair)
