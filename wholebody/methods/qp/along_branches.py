@@ -74,8 +74,9 @@ class Along(NamedTuple):
             here, before = self._look(free.values, begin + share * (end - begin)), free.effort
             if here is not None and here.gap >= 0.0:
                 free = here if here.effort < before else free
-                near, far = (share, here.gap), (far[0], 0.5 * far[1])
-                last = far[1] != far[1] and before - free.effort < SEEDS.gain * before
+                near, far, gained = (share, here.gap), (far[0], 0.5 * far[1]), before - free.effort
+                # halves of the way to where a branch ends gain 0.7 of those before, or less
+                last = far[1] != far[1] and gained < max(SEEDS.gain * before, 0.25 * (free.effort - most))
                 if share == 1.0 or here.gap <= SEEDS.edge or last:
                     break
             else:
