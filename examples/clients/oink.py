@@ -195,12 +195,14 @@ def scalars(body):
     return [name for name in body["coordinates"] if name in body["effort_weights"]]
 
 
-def refusal(problem):
+def refusal(folder, problem):
     """What OInK has no task for, or nothing."""
     if "frames" in problem:
         return "goals that move are not followed"
     if problem["balance"]:
         return "balance is not expressed"
+    if json.loads((folder / problem["body"]).read_text())["root"] == "several":
+        return "several figures are not expressed"
     if any(goal["type"] == "axis" for goal in problem["goals"]):
         return "an axis that points towards a place is not expressed"
     return ""
@@ -213,8 +215,8 @@ def main(folder, out, *sets):
         problem = json.loads((folder / "problems" / f"{name}.json").read_text())
         for seed in ("near", "far"):
             answer = {"problem": name, "seed": seed}
-            if refusal(problem):
-                answers.append(answer | {"refused": refusal(problem)})
+            if refusal(folder, problem):
+                answers.append(answer | {"refused": refusal(folder, problem)})
                 continue
             q, seconds = solve(folder, problem, seed)
             answers.append(answer | {"posture": q.tolist(), "seconds": seconds})

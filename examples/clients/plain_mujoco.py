@@ -125,12 +125,14 @@ def solve(folder, problem, seed, turns=150):
     return [*data.qpos[[0, 1, 2, 4, 5, 6, 3][:root]], *data.qpos[places]], time.perf_counter() - began
 
 
-def refusal(problem):
+def refusal(folder, problem):
     """Return what this client does not express, if anything."""
     if "frames" in problem:
         return "goals that move are not followed"
     if problem["balance"]:
         return "balance is not expressed"
+    if json.loads((folder / problem["body"]).read_text())["root"] == "several":
+        return "several figures are not expressed"
     return "axes are not expressed" if any(goal["type"] == "axis" for goal in problem["goals"]) else None
 
 
@@ -141,7 +143,7 @@ def main(folder, out, *sets):
         problem = json.loads((folder / "problems" / f"{name}.json").read_text())
         for seed in ("near", "far"):
             answer = {"problem": name, "seed": seed}
-            if why := refusal(problem):
+            if why := refusal(folder, problem):
                 answers.append(answer | {"refused": why})
                 continue
             posture, seconds = solve(folder, problem, seed)

@@ -66,6 +66,8 @@ def joint_in(model: pin.Model, prefix: str, joint: str) -> int:
 def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str, at: pin.SE3) -> Parts:
     """The same of a figure with another one on a frame of it; see `Figure.mounted`."""
     for one in (base, other):
+        if one.root == "several":
+            raise InputError(f"{one.name!r} is several figures; mount one on another before they are joined")
         check_single(one, one.name)
     figure = other.reduced(other.joints) if other.roots else other
     model, part = _with(pin.Model(base.model), figure, prefix, frame, at)

@@ -16,6 +16,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
 from wholebody.bench.suite.published.bodies import body_files
 from wholebody.bench.suite.published.export import export
+from wholebody.bench.suite.published.problems import problem_content
 from wholebody.bench.suite.published.rebuilt import Rebuilt
 from wholebody.cli import main
 
@@ -201,7 +202,43 @@ def check(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str) 
             check(inner, schema.get("items", {}), root, f"{where}[{place}]")
 
 
-def test_scenes_of_several_figures_are_refused_before_anything_is_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"two_figures: its scenes have several figures.*leave it out"):
-        export([problem_set("two_figures")], 1, 0, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+@pytest.fixture(scope="module")
+def figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two people, two arms, and a person with an arm."""
+    made = tmp_path_factory.mktemp("figures") / "out"
+    export([problem_set("two_figures")], 3, SEED, made)
+    return made
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_several_figures_are_one_body_of_which_free_roots_float(figures: Path, number: int) -> None:
+    """The files, read by Pinocchio and coal alone, are judged as the package judges the scene."""
+    case, rebuilt = problem_set("two_figures").make(number, SEED), Rebuilt(figures, f"two_figures/{number:04d}")
+    body = json.loads((figures / rebuilt.content["body"]).read_text())
+    check(body, schema := json.loads((figures / "body.schema.json").read_text()), schema, "body")
+    figure, problem, places = case.problem.scene.figure, case.problem, ("x", "y", "z", "qx", "qy", "qz", "qw")
+    where: dict[str, int] = {}
+    for name, joint in zip(list(figure.model.names)[1:], list(figure.model.joints)[1:], strict=True):
+        named = [name] if joint.nq == 1 else [f"{name} {place}" for place in places]
+        where |= {one: joint.idx_q + k for k, one in enumerate(named)}
+    assert set(where) == set(body["coordinates"])
+    assert len(body["root_effort_weights"]) == 6 * len(figure.roots) == 6 * (2, 0, 1)[number]
+    order, rng = [where[name] for name in body["coordinates"]], np.random.default_rng(5)
+    for spread in (0.0, 0.05, 0.3):
+        q = pin.integrate(figure.model, case.witness, spread * rng.uniform(-1.0, 1.0, figure.model.nv))
+        expected, found = wb.assess(problem, q), rebuilt.score(q[order])
+        assert found.goal_error == pytest.approx(expected.goal_error, abs=1e-9)
+        assert found.goal_angle == pytest.approx(expected.goal_angle, abs=1e-7)
+        assert found.overlap == pytest.approx(expected.penetration, abs=1e-6)
+        assert found.limits == pytest.approx(expected.limit_violation, abs=1e-9)
+        (effort,) = (term for term in problem.measures if isinstance(term, wb.Effort))
+        assert found.effort == pytest.approx(effort.value(problem.scene.state(q)), rel=1e-9, abs=1e-12)
+
+
+def test_balance_of_one_of_several_has_no_word(figures: Path) -> None:
+    case = problem_set("two_figures").make(2, SEED)
+    feet = ["one/left_foot", "one/right_foot"]
+    case.problem.constraints = (*case.problem.constraints, wb.Balance(feet).resolve(case.problem.scene, case.witness))
+    body = body_files(case.problem.scene.figure, "both", {})
+    with pytest.raises(InputError, match="no word for Balance of one of several figures"):
+        problem_content(case, body, case.witness, {})

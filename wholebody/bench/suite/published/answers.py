@@ -122,12 +122,12 @@ def _posture(row: Any, problem: Rebuilt, where: str) -> Array:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= 1e6:
             raise FileFormatError(f"{where}[{place}] is {shown(value)}; give finite radians and metres")
     q = np.array(row, dtype=float)
-    if problem.free:
-        length = float(np.linalg.norm(q[3:7]))
+    for joint in problem.model.joints:
+        first = joint.idx_q + 3
+        length = float(np.linalg.norm(q[first : first + 4])) if joint.nq == 7 else 1.0
         if abs(length - 1.0) > 1e-6:
-            raise FileFormatError(
-                f"{where}: the root's quaternion (numbers 3 to 6: x, y, z, w) has length {length:.6g}; normalise it"
-            )
+            numbers = f"numbers {first} to {first + 3}: x, y, z, w"
+            raise FileFormatError(f"{where}: the root's quaternion ({numbers}) has length {length:.6g}; normalise it")
     return q
 
 

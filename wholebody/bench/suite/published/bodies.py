@@ -15,11 +15,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
 from wholebody.bench.suite.published.rebuilt import SHAPES, VERSION, model_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.loading import one_figure
 from wholebody.figures.urdf.writing import add_joint, add_model_joint, exact, urdf_axis
 from wholebody.geometry.flesh import settled
 
@@ -65,8 +65,8 @@ class BodyFiles:
 
 
 def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
-    """Write a figure of hinges, slides and a free root; convex pieces go to the meshes."""
-    one_figure(figure, f"{name}: a published body; the figure")
+    """Write a figure of hinges, slides and free roots, or several as one body; convex pieces go to the meshes."""
+    instance(figure, Figure, f"{name}: a published body", "load one with wb.load('human')")
     if figure.followers:
         raise InputError(f"{name}: joints of it follow others, which a published body does not say; leave it out")
     model = figure.model
@@ -75,22 +75,30 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
     text = _urdf(figure, geometry, name, links, meshes)
     read = model_of(text, figure.root)
     order = _order(figure, read)
-    joints = [joint for joint in read.names if joint != "universe" and joint in figure.joints]
+    joints = [joint for joint in read.names if joint in figure.joints]
     place = {joint: model.joints[figure.joint_id(joint)] for joint in joints}
     known = figure.limits
     limits = {int(k): (float(a), float(b)) for k, a, b in zip(known.idx_q, known.lower, known.upper, strict=True)}
     bounds = {joint: limits[place[joint].idx_q] for joint in joints if place[joint].idx_q in limits}
-    root = [f"root {name}" for name in ("x", "y", "z", "qx", "qy", "qz", "qw")] if figure.root == "free" else []
+    weights = figure.effort_weights
+    coordinates, of_roots = list[str](), list[float]()
+    for joint, own in _joints(figure, read):
+        if own.nq == 7:
+            said = "root" if figure.root == "free" else joint
+            coordinates += [f"{said} {number}" for number in ("x", "y", "z", "qx", "qy", "qz", "qw")]
+            of_roots += [float(weight) for weight in weights[own.idx_v : own.idx_v + 6]]
+        else:
+            coordinates.append(joint)
     content = {
         "format": "wholebody body",
         "version": VERSION,
         "name": name,
         "urdf": f"bodies/{name}.urdf",
         "root": figure.root,
-        "coordinates": [*root, *joints],
+        "coordinates": coordinates,
         "limits": {joint: list(ends) for joint, ends in bounds.items()},
-        "effort_weights": {joint: float(figure.effort_weights[place[joint].idx_v]) for joint in joints},
-        "root_effort_weights": [float(weight) for weight in figure.effort_weights[: 6 if figure.root == "free" else 0]],
+        "effort_weights": {joint: float(weights[place[joint].idx_v]) for joint in joints},
+        "root_effort_weights": of_roots,
         "pieces": [
             {
                 "name": piece.name,
@@ -144,6 +152,10 @@ def _urdf(figure: Figure, geometry: pin.GeometryModel, name: str, links: tuple[s
 
 def _add_joint(top: ElementTree.Element, model: pin.Model, joint: int, links: tuple[str, ...]) -> None:
     known, at = urdf_axis(model, joint), model.joints[joint].idx_q
+    parent = links[model.parents[joint]]
+    if model.joints[joint].nq == 7:  # the free root of one of several figures
+        add_joint(top, model.names[joint], "floating", parent, links[joint], origin=model.jointPlacements[joint])
+        return
     if known is None or known.kind == "continuous":
         raise InputError(
             f"joint {model.names[joint]!r} is a {model.joints[joint].shortname()}; only hinges and slides with limits "
@@ -152,7 +164,7 @@ def _add_joint(top: ElementTree.Element, model: pin.Model, joint: int, links: tu
     low, high = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
     if not max(abs(low), abs(high)) < 1e6:  # rad, m: beyond which a limit is none
         raise InputError(f"joint {model.names[joint]!r} has no limits; give it limits to publish it")
-    add_model_joint(top, model, joint, model.names[joint], links[model.parents[joint]], links[joint])
+    add_model_joint(top, model, joint, model.names[joint], parent, links[joint])
 
 
 def _add_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
@@ -186,8 +198,11 @@ def _order(figure: Figure, read: pin.Model) -> Indices:
     """Where the numbers of a posture of the files are in one of the figure."""
     if read.nq != figure.model.nq:
         raise InputError(f"{figure.name}: written as a URDF it has {read.nq} coordinates, not {figure.model.nq}")
-    order = list(range(7)) if figure.root == "free" else []
-    for name, joint in zip(read.names, read.joints, strict=True):
-        if joint.nq == 1 and name in figure.joints:
-            order.append(figure.model.joints[figure.joint_id(name)].idx_q)
-    return np.array(order, dtype=np.intp)
+    places = [range(own.idx_q, own.idx_q + own.nq) for _, own in _joints(figure, read)]
+    return np.array([place for each in places for place in each], dtype=np.intp)
+
+
+def _joints(figure: Figure, read: pin.Model) -> list[tuple[str, Any]]:
+    """The joints of a model of the files, by name, each with that of the figure."""
+    names, model = list(read.names)[1:], figure.model
+    return [(name, model.joints[1 if name == "root_joint" else model.getJointId(name)]) for name in names]

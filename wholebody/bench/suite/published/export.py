@@ -127,8 +127,6 @@ def _written_set(
 
 def _body(done: _Export, case: Case) -> BodyFiles:
     figure = case.problem.scene.figure
-    if figure.root == "several":
-        raise InputError(f"{case.set}: its scenes have several figures, and a published body is one; leave it out")
     if id(figure) not in done.bodies:
         name = "human" if figure is human() else f"{case.set}-{case.number:04d}"
         meshes: dict[str, str] = {}

@@ -93,6 +93,8 @@ def _placed(frame: str, base: str | None, position: Array, rotation: Array | Non
 
 def _balance(term: wb.Balance) -> dict[str, Any]:
     """The centre of mass x fulfils `normals @ x[:2] - offsets >= margin`."""
+    if term.joints is not None:
+        raise InputError("the files have no word for Balance of one of several figures")
     return {"normals": [_listed(row) for row in term.normals], "offsets": _listed(term.offsets), "margin": term.margin}
 
 
@@ -173,7 +175,7 @@ def _free(problem: wb.Problem) -> Indices:
     for term in problem.constraints:
         if isinstance(term, wb.Hold) and term.relative_to is None:
             carrying |= set(_supports(model, model.frames[problem.scene.figure.frame_id(term.frame)].parentJoint))
-    legs = carrying - {0, 1}  # without the root
+    legs = carrying - {0, *problem.scene.figure.roots.values()}
     beyond = {joint for joint in range(1, model.njoints) if legs & set(_supports(model, joint))}
     limits = problem.scene.figure.limits
     kept = {model.joints[joint].idx_v for joint in carrying | beyond if joint > 0}
@@ -193,11 +195,12 @@ def _drawn(problem: wb.Problem, free: Indices, rng: np.random.Generator) -> Arra
 
 
 def away(case: Case) -> Array:
-    """Way (n,) of all joints but a free root from the start to the end of its path [rad, m], or to the witness."""
+    """Way (n,) of all joints but free roots from the start to the end of its path [rad, m], or to the witness."""
     figure = case.problem.scene.figure
     end = case.path[-1] if len(case.path) else case.witness
     found = pin.difference(figure.model, case.problem.start, end)
-    return np.asarray(found[6:] if figure.root == "free" else found)
+    roots = [figure.model.joints[joint].idx_v for joint in figure.roots.values()]
+    return np.delete(found, [first + k for first in roots for k in range(6)])
 
 
 def descended(case: Case, seed: Array) -> Array | None:

@@ -130,14 +130,14 @@ class Body:
 
 
 class Rebuilt:
-    """A problem as its files state it; `moving`: an answer has a posture a frame, `free`: with the root's place."""
+    """A problem as its files state it; `moving`: an answer has a posture a frame."""
 
     def __init__(self, folder: Path, name: str) -> None:
         """Read a problem, such as "clutter/0007"; FileFormatError where a file is wrong."""
         path = folder / "problems" / f"{name}.json"
         self.content = read_json(path, "problem")
         body = read_body(folder, str(self.content["body"]))
-        self.model, self.moving, self.free = body.model, "frames" in self.content, body.content["root"] == "free"
+        self.model, self.moving = body.model, "frames" in self.content
         self._body = body.content
         self._data = self.model.createData()
         pieces = [_piece(body, item, shape) for item, shape in zip(self._body["pieces"], body.shapes, strict=True)]
@@ -149,7 +149,9 @@ class Rebuilt:
         self._results = pin.GeometryData(self._geometry)
         weights = self._body["effort_weights"]
         self._weights = np.zeros(self.model.nv)
-        self._weights[: len(self._body["root_effort_weights"])] = self._body["root_effort_weights"]
+        roots = np.array(self._body["root_effort_weights"]).reshape(-1, 6)
+        for joint, own in zip([joint for joint in self.model.joints if joint.nq == 7], roots, strict=True):
+            self._weights[joint.idx_v : joint.idx_v + 6] = own
         for joint, weight in weights.items():
             self._weights[self.model.joints[self.model.getJointId(joint)].idx_v] = weight
         self._effort_from = np.array(self.content["effort_from"])
@@ -279,7 +281,7 @@ def read_body(folder: Path, path: str) -> Body:
 
 
 def model_of(urdf: str, root: str) -> pin.Model:
-    """Pinocchio's model of a URDF on a root that is "free" or "fixed"."""
+    """Pinocchio's model of a URDF on a root that is "free" or "fixed", or of "several" with joints that float."""
     return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer()) if root == "free" else pin.buildModelFromXML(urdf)
 
 
