@@ -19,7 +19,6 @@ from wholebody.planning.smoothing import length
 
 LIMIT = 2.0  # s of the processor, of each plan
 LONG = 1.3  # of the shortest motion of a problem
-RESOLUTION = 0.02  # rad: between the postures of an edge that OMPL tests; ours proves edges free
 
 ONE_END = ", one end"  # planners to the same posture: their lengths count against the shortest of all of them
 
@@ -64,13 +63,24 @@ def _attempts(asked: Question, seeds: int) -> dict[str, list[Attempt]]:
     return {"wholebody": ours, f"wholebody{ONE_END}": alike, f"ompl{ONE_END}": _by_ompl(free, end, seeds)}
 
 
+def _edges(information: Any, local: Geodesics, size: int) -> Any:
+    """What tests an edge of OMPL as ours are tested: by bisection that proves it free."""
+    from ompl import base
+
+    def proven(_: Any, first: Any, last: Any, *__: Any) -> bool:
+        q, there = (np.array([at[joint] for joint in range(size)]) for at in (first, last))
+        return local.towards(q, there)[1]
+
+    return type("Edges", (base.MotionValidator,), {"checkMotion": proven})(information)
+
+
 def _free(problem: wb.Problem, path: list[Any]) -> bool:
     """Whether the sweep that judges our plans finds nothing that straight motions between postures pass through."""
     return bool(path) and not frames_passed_through(problem.scene, np.array(path), PASSED)
 
 
 def _by_ompl(problem: wb.Problem, end: Any, seeds: int) -> list[Attempt]:
-    """RRT-Connect and path simplification of OMPL for a posture, whose states our compiled query tests."""
+    """RRT-Connect and path simplification of OMPL for a posture, with our tests of states and edges."""
     from ompl import base, geometric, util
 
     util.setLogLevel(util.LOG_NONE)
@@ -89,7 +99,7 @@ def _by_ompl(problem: wb.Problem, end: Any, seeds: int) -> list[Attempt]:
             setup = geometric.SimpleSetup(space)
             setup.setStateValidityChecker(lambda at: local.free(np.array([at[joint] for joint in range(size)])))
             information = setup.getSpaceInformation()
-            information.setStateValidityCheckingResolution(RESOLUTION / space.getMaximumExtent())
+            information.setMotionValidator(_edges(information, local, size))
             first, last = space.allocState(), space.allocState()
             for joint in range(size):
                 first[joint], last[joint] = float(problem.start[joint]), float(end[joint])

@@ -24,7 +24,7 @@ AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
-POLISHED = 0.65  # of the time limit: the shortest path is drawn tight again until then
+POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
 
 
 class Search:
@@ -51,7 +51,7 @@ class Search:
 
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
-        model, best, most, samples, runs = self._problem.scene.model, None, np.inf, 0, 0
+        model, most, samples, runs = self._problem.scene.model, np.inf, 0, 0
         paths: list[list[Array]] = []
         enough: float = self._local.samples
         while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
@@ -68,35 +68,41 @@ class Search:
                 path = nearer(self._problem, path, self._local, self._sampler)
             paths.append(path)
             if (found := length(model, path)) < most:
-                best, most = path, found
+                most = found
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
             long = self._local is not self._slides and not self._bodily and most > LONG * straight
             self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
-        if best is not None:
-            while self._local is not self._slides and BUDGET.spent < POLISHED:
-                with self._in_time(best):
-                    left = BUDGET.left
-                # a path that there is no time to smooth stops at its corners, and is judged three times as long
-                if left < 0.2:
-                    break
-                # most of the remaining time is for smoothing
-                with within_budget(0.3 * left):
-                    short = shortcut(model, best, self._local, self._rng, True) if self._bodily else best
-                    tight = tighten(model, short, self._local, self._slides)
-                best = min(best, short, tight, key=lambda path: length(model, path))
-                before, most = most, length(model, best)
-                if most > 0.97 * before:  # where it is longer, it stays as it is
-                    break
-            paths = sorted([best, *paths], key=lambda path: length(model, path))
-            best = next((path for path in paths if self._proven(path)), None)
+        ready = sorted([*self._polished(paths), *paths], key=lambda path: length(model, path))
+        best = next((path for path in ready if self._proven(path)), None)
         if best is not None:
             return best, f"the shortest of {runs} searches"
         if not self._reached:
             late = "" if BUDGET.spent < SEARCHED else " was found in time that"
             return None, f"no posture{late} meets the goals: {self._said}"
         return None, "no motion was found within the time limit"
+
+    def _polished(self, paths: list[list[Array]]) -> list[list[Array]]:
+        """Paths drawn tight: the shortest one again and again, and where that is tight the next, as time lets them."""
+        model, found = self._problem.scene.model, list[list[Array]]()
+        waiting = sorted(paths, key=lambda path: length(model, path))
+        while waiting and self._local is not self._slides and BUDGET.spent < POLISHED:
+            path = waiting.pop(0)
+            with self._in_time(path):
+                left = BUDGET.left
+            # a path that there is no time to smooth stops at its corners, and is judged three times as long
+            if left < 0.2:  # s: a body's smoothing takes as long
+                break
+            # most of the remaining time is for smoothing
+            with within_budget(0.3 * left):
+                tight = tighten(model, path, self._local, self._slides)
+            best = min(path, tight, key=lambda each: length(model, each))
+            if length(model, best) > 0.97 * length(model, path):  # it counts as tight
+                found.append(best)
+            else:
+                waiting.insert(0, best)
+        return [*found, *waiting]
 
     def _proven(self, path: list[Array]) -> bool:
         """Whether all motions between the postures of a path are free and keep constraints, those by steps too."""

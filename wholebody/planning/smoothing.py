@@ -14,7 +14,6 @@ from wholebody.figures.model_check import joint_of
 from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import LocalPlanner
 
-WORTH = 0.98  # of the length of a part: a shortcut is at most as long
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
 APART = 0.5  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
 SPREAD = 0.05  # of the length of a path: width of the filter; larger = smoother, farther off
@@ -34,7 +33,7 @@ def shortcut(
     while failed < local.tries and len(path) > 2 and not BUDGET.over:
         first, last = sorted(rng.choice(len(path), 2, replace=False).tolist())
         part = path[first : last + 1]
-        most = WORTH * length(model, part)
+        most = 0.98 * length(model, part)  # a shortcut is shorter
         alone = partial and failed % 2
         way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
         path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
