@@ -25,8 +25,10 @@ def streamed(stream: wb.motion.Retargeter, motion: SkeletonMotion) -> np.ndarray
     return np.concatenate([*found, stream.finish()])
 
 
-def test_a_stream_gives_the_postures_of_the_recording(tmp_path: Path) -> None:
-    motion, figure = walker(flat, 2.4)[0], robot(tmp_path)
+@pytest.mark.parametrize(("seconds", "rate"), [(2.4, 30.0), (4.6, 60.0)])
+def test_a_stream_gives_the_postures_of_the_recording(seconds: float, rate: float, tmp_path: Path) -> None:
+    """At 60 Hz too, where first sweeps take every second frame: a walk played twice as fast."""
+    motion, figure = replace(walker(flat, seconds)[0], dt=1.0 / rate), robot(tmp_path)
     ground = wb.motion.ground(motion)
     batch = wb.retarget(motion, figure, ground=ground)
     stream = wb.motion.Retargeter(motion, figure, ground=ground)

@@ -119,10 +119,12 @@ class Run:
             ]
             span, sweeps = self.span, SWEEPS
             while span:
-                for omega in sweeps:
+                for number, omega in enumerate(sweeps):
                     if span == 1 and omega < LATE:
                         self._stages.append((partial(self._looked, parts=MENDED[0] // 2), 0))
-                    self._stages.append((partial(self._swept, omega=omega, span=span), 2 * span))
+                    # what lies between is interpolated from frames up to three away, as the sweeps before left them
+                    wait = 2 * span if number or span == self.span else 3 * span
+                    self._stages.append((partial(self._swept, omega=omega, span=span), wait))
                 span, sweeps = span // 2, FINER
                 if span:
                     self._stages.append((partial(self._between, span=span), 3 * span))
