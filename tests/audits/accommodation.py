@@ -72,7 +72,8 @@ class Criterion:
         return found
 
     def _by_thigh_clearance(self, scene: wb.Scene) -> list[Any]:
-        scene.add(wb.Box((0.6, 1.2, 0.03)), name="desk", at=(0.60, 0.0, HIGH + self.value + 0.015))
+        # from 0.32 m on: in front of bellies, which would meet it, and where thighs are as thick as measured
+        scene.add(wb.Box((0.6, 1.2, 0.03)), name="desk", at=(0.62, 0.0, HIGH + self.value + 0.015))
         return []
 
     def _by_hip_breadth_sitting(self, scene: wb.Scene) -> list[Any]:
@@ -141,7 +142,7 @@ def _seated(figure: wb.Figure, deep: float = 0.40, high: float = HIGH, thick: fl
 
 
 def _on_seat(figure: wb.Figure, criteria: Sequence[Criterion]) -> wb.Problem:
-    scene = _seated(figure)
+    scene = _seated(figure, 0.36)  # as deep as the thighs of the smallest
     terms = [term for one in criteria for term in one.beside(scene)]
     return wb.Problem(scene, "sitting", constraints=[SIT, *terms])
 

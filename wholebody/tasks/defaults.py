@@ -160,7 +160,10 @@ def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
 
 
 def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on."""
+    """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on.
+
+    Those of somebody with one foot on one thing and one on another are together, as both belong to a stance.
+    """
 
     def kneels(stand: Stand) -> bool:
         with scene.figure.posed(start) as state:
@@ -171,8 +174,11 @@ def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> t
         # m, rad: who misses a `Stand` by less at the start kneels there
         return bool(missed <= 0.05) and max(upright) < 0.5
 
-    stand = (one for one in terms if is_a(one, (Stand,)))
-    return tuple(tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one)))
+    stand = [one for one in terms if is_a(one, (Stand,))]
+    found = [tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one))]
+    single = {one.feet[0]: inputs.body_of(scene, one.feet) for one in stand if len(one.feet) == 1 and not one.knees}
+    pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet in found]
+    return tuple(dict.fromkeys(pair if len(pair) == 2 else feet for feet, pair in zip(found, pairs, strict=True)))
 
 
 def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:
