@@ -19,6 +19,8 @@ from wholebody.base.compiled import compiled
 
 STEPS = 8  # most
 PART = 1e-2  # of the mobility, that holds impulses at first: less strays more; each better step takes a tenth of it
+LEAST = 1e-4  # least of it: with less, impulses that cancel each other in what is squeezed grow, and bring energy
+GROWTH = 2.0  # most by which all normal impulses together may grow, for the same reason
 STRAY = 1e3  # as often as violated as the best before it, a step is taken back
 
 
@@ -57,8 +59,12 @@ def newton(mobility: Array, rest: Array, friction: Array, target: Array, impulse
     """
     size, part = len(rest), PART
     now, best, velocity = impulse.copy(), impulse.copy(), np.empty(size)
-    least = np.inf
+    least, most = np.inf, 0.0
     for step in range(STEPS + 1):
+        pressed = 0.0
+        for c in range(len(friction)):
+            pressed += abs(now[c, 0])
+        most = GROWTH * pressed if step == 0 else most
         for k in range(size):
             total = rest[k]
             for c in range(len(friction)):
@@ -66,10 +72,10 @@ def newton(mobility: Array, rest: Array, friction: Array, target: Array, impulse
                     total += mobility[k, 3 * c + row] * now[c, row]
             velocity[k] = total
         off = violation(mobility, velocity, friction, target, now)
-        if off < least:
-            least, part = off, part if step == 0 else max(0.1 * part, 1e-7)
+        if off < least and pressed <= most:
+            least, part = off, part if step == 0 else max(0.1 * part, LEAST)
             _copy(now, best)
-        elif not off < STRAY * least:
+        elif not (off < STRAY * least and pressed <= most):
             part = min(10.0 * part, 1.0)
             _copy(best, now)
             continue
