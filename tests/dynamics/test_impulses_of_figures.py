@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 import wholebody as wb
 from wholebody.dynamics.coupling import approaches
 from wholebody.dynamics.impulse_kernel import add_bodies, by_inertia, impulses, mobilities, solve
-from wholebody.dynamics.newton_kernel import newton
 
 
 def test_few_of_many_points_bear_what_the_laws_of_contact_ask() -> None:
@@ -84,45 +82,3 @@ def test_distances_fall_no_faster_than_the_bound_of_their_pair() -> None:
         assert (falls < bound[before.number] + 0.02).all()
         tight += int((falls > 0.5 * bound[before.number]).sum())
     assert tight > 50  # else the bound says little
-
-
-def test_a_heavy_body_on_a_tower_of_light_ones_slides_or_sticks_as_in_closed_form() -> None:
-    """Sweeps pass on a hundredth of its weight to the floor in each; the linear system of what bears has it at once."""
-    mass, fall, rough = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0]), 0.08, 0.5
-    count = len(mass)
-    rows, inertia = np.zeros((3 * count, 3 * count)), np.diag(np.repeat(mass, 3))
-    for k in range(count):  # body k on body k - 1, the first on the floor; axes z, x, y
-        rows[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = np.eye(3)
-        if k:
-            rows[3 * k : 3 * k + 3, 3 * k - 3 : 3 * k] = -np.eye(3)
-    above = np.cumsum(mass[::-1])[::-1]  # that each bears, with its own
-    mobility, friction, none = mobilities(inertia, rows), np.full(count, rough), np.zeros(count)
-    for along, slides in ((0.02, False), (0.3, True)):
-        velocity = np.zeros((count, 3))
-        velocity[:, 0], velocity[-1, 2] = -fall, along
-        impulse = np.zeros((count, 3))
-        speed = rows @ velocity.ravel()
-        for _ in range(3):  # a tower needs more steps than figures do
-            newton(mobility, speed, friction, none, impulse, 1e-9)
-        np.testing.assert_allclose(impulse[:, 0], fall * above, rtol=1e-5)
-        drawn = rough * fall * mass[-1] if slides else along * mass[-1]
-        np.testing.assert_allclose(impulse[:, 2], -drawn, rtol=1e-5)
-        rates = np.cumsum((speed + mobility @ impulse.ravel()).reshape(-1, 3), axis=0)  # of each body
-        assert np.abs(rates[:-1]).max() < 1e-5
-        assert rates[-1] == pytest.approx((0.0, 0.0, along - rough * fall if slides else 0.0), abs=1e-5)
-
-
-def test_corners_that_bear_more_than_a_body_has_freedoms_share_it() -> None:
-    """A box on four corners: no impulse is right alone, but their sum and moment are; pushed, all four slide."""
-    corners = np.array([(x, y, -0.1) for x in (-0.2, 0.2) for y in (-0.1, 0.1)])
-    rows = np.vstack([
-        np.hstack([axis, np.cross(corner, axis)]) for corner in corners for axis in np.eye(3)[[2, 0, 1]]
-    ])  # fmt: skip
-    inertia = np.diag([4.0, 4.0, 4.0, 0.05, 0.1, 0.1])
-    mobility, friction = mobilities(inertia, rows), np.full(4, 0.3)
-    speed = rows @ np.array([1.0, 0.0, -0.5, 0.0, 0.0, 0.0])
-    impulse = np.zeros((4, 3))
-    assert newton(mobility, speed, friction, np.zeros(4), impulse, 1e-9) < 1e-9
-    end = np.array([1.0, 0.0, -0.5, 0.0, 0.0, 0.0]) + np.linalg.solve(inertia, rows.T @ impulse.ravel())
-    assert impulse[:, 0].sum() == pytest.approx(2.0, abs=1e-6)  # 4 kg that fell at 0.5 m/s
-    assert end == pytest.approx((1.0 - 0.3 * 0.5, 0.0, 0.0, 0.0, 0.0, 0.0), abs=1e-6)

@@ -242,3 +242,10 @@ def test_a_link_may_have_the_name_of_its_joint(tmp_path: Path) -> None:
     kinds = [(frame.name, str(frame.type)) for frame in both.model.frames]
     assert len(set(kinds)) == len(kinds)
     assert {("a/close", "JOINT"), ("a/close", "BODY")} <= set(kinds)
+
+
+def test_mounting_on_several_figures_says_what_to_do() -> None:
+    hand = wb.load("hand")
+    both = wb.Scene({"one": hand, "other": (hand, (1.0, 0.0, 0.0))}).figure
+    with pytest.raises(wb.InputError, match="'one and other' is several figures; mount one on another before they are"):
+        both.mounted(wb.load("hand"), on="one/right_palm")

@@ -9,7 +9,6 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled, with_loops
 from wholebody.base.dense_kernel import factorise, gram, substitute
-from wholebody.dynamics.newton_kernel import newton, side_mobility, violation
 from wholebody.dynamics.solve_kernel import FAST, along_way
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
@@ -83,8 +82,7 @@ def solve(
     """Change impulses (m, 3) along the axes of m points, by the method of `solve_kernel`, both frictions together.
 
     At every point 0 <= p_n is complementary to u_n - target >= 0, and p_t is at most friction p_n against the sliding.
-    Sweeps go over points that approach or did so before, a few of those that are near. Where sweeps are slow, steps of
-    Newton's method (`newton_kernel`) go on from the points that bear.
+    Sweeps go over points that approach or did so before, a few of those that are near.
 
     Args:
         mobility: (3 m, 3 m) change of the velocities by unit impulses.
@@ -92,8 +90,7 @@ def solve(
         laws: friction (m,), and the least velocities (m,) along the normals, m/s.
         impulse: to begin with.
         most: sweeps.
-        tolerance: change of all velocities at which it ends, in two sweeps, one each way, m/s; or a hundredth of
-            that by which they are off the laws.
+        tolerance: change of all velocities at which it ends, in two sweeps, one each way, m/s.
     """
     friction, target = laws
     count = len(friction)
@@ -123,19 +120,13 @@ def solve(
                 for row in range(3):
                     for k in range(3):
                         among[3 * c + row, 3 * d + k] = mobility[3 * chosen[c] + row, 3 * chosen[d] + k]
-        given, own_laws, rest = np.zeros((number, 3)), np.empty((2, number)), np.empty(3 * number)
+        given = np.zeros((number, 3))
         for c in range(number):
-            own_laws[0, c], own_laws[1, c] = friction[chosen[c]], target[chosen[c]]
             for row in range(3):
-                given[c, row], rest[3 * c + row] = impulse[chosen[c], row], velocity[3 * chosen[c] + row]
-        for c in range(number):
-            _push(3 * c, -given[c, 0], -given[c, 1], -given[c, 2], among, rest)
+                given[c, row] = impulse[chosen[c], row]
         some = min(some, most - sweeps)
         done, calm = _sweep(among, velocity, (friction, target, chosen[:number], given), some, tolerance)
         sweeps, some = sweeps + done, 2 * some
-        if not calm and sweeps >= 24:
-            # few end farther off, and these hardly gain by more sweeps
-            calm = newton(among, rest, own_laws[0], own_laws[1], given, 2.0 * tolerance) < 100.0 * tolerance
         for c in range(number):
             one, two, three = given[c, 0], given[c, 1], given[c, 2]
             own = chosen[c]
@@ -169,7 +160,7 @@ def _sweep(
                 continue
             step, one, two = now - held, 0.0, 0.0
             # one step along both axes, with a bound of the mobility along any; 0 where nothing moves along them
-            side = side_mobility(mobility, row)
+            side = max(mobility[row + 1, row + 1], mobility[row + 2, row + 2]) + abs(mobility[row + 1, row + 2])
             if rough > 0.0 and side > 1e-12:
                 one = impulse[c, 1] - (velocity[row + 1] + mobility[row + 1, row] * step) / side
                 two = impulse[c, 2] - (velocity[row + 2] + mobility[row + 2, row] * step) / side
@@ -230,6 +221,26 @@ def _split(
                 moved += weight[k] * (new - impulse[k]) ** 2
                 impulse[k] = new
     return np.sqrt(broken), np.sqrt(moved)
+
+
+@compiled(error_model="numpy")
+def violation(mobility: Array, velocity: Array, friction: Array, target: Array, impulse: Array) -> float:
+    """Most by which a velocity (3 m,) with the impulses (m, 3) is off the laws of contact, m/s; see `solve`."""
+    worst = 0.0
+    for c in range(len(friction)):
+        row = 3 * c
+        own = mobility[row, row]
+        if own <= 1e-12:
+            continue
+        now = max(0.0, impulse[c, 0] + (target[c] - velocity[row]) / own)
+        worst = max(worst, abs(now - impulse[c, 0]) * own)
+        side = max(mobility[row + 1, row + 1], mobility[row + 2, row + 2]) + abs(mobility[row + 1, row + 2])
+        if side > 1e-12:
+            one, two = impulse[c, 1] - velocity[row + 1] / side, impulse[c, 2] - velocity[row + 2] / side
+            share = min(1.0, friction[c] * now / max(np.sqrt(one * one + two * two), 1e-300))
+            off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
+            worst = max(worst, off * side)
+    return worst
 
 
 @compiled(error_model="numpy")
@@ -296,4 +307,3 @@ def compiled_kernel(_: Any) -> None:
     solve(eye, three, (one, one), np.zeros((1, 3)), 1, 1e-9)
     _split(eye, np.ones(3), three, one, three.copy(), three.copy(), 1)
     violation(eye, three, one, one, np.zeros((1, 3)))
-    newton(eye, three, one, one, np.zeros((1, 3)), 1.0)
