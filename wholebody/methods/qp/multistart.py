@@ -72,17 +72,24 @@ class QPMultistart(Search):
         yield Attempt(begin, self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
-        if (low := crouched(self.problem, self.lineariser.state, self._start)) is not None:
-            missed = [float(np.linalg.norm(self.lineariser.at(q, 0.0).goal_error)) for q in (low, self._start)]
-            yield Attempt([low] if missed[0] < missed[1] else [], self.directly, "from a squat")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
         self._least = least
+        if not least:
+            yield Attempt(self._nearer_squat(), self.directly, "from a squat")
         if self.settings.measures and not self._proven():
             yield Attempt([self._start], self._without_measures, "")
         elif not self._proven():
             yield from self._attempts_for_feasibility()
+
+    def _nearer_squat(self) -> Iterator[Array]:
+        """The squat of a figure that balances, if it is nearer to the goals than the start by a third."""
+        low = crouched(self.problem, self.lineariser.state, self._start)
+        for q in self.lineariser.defined([] if low is None else [low]):
+            missed = [float(np.linalg.norm(self.lineariser.at(each, 0.0).goal_error)) for each in (q, self._start)]
+            if missed[0] < 2 / 3 * missed[1]:  # else few goals are met from there that are not from the start
+                yield q
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
