@@ -18,7 +18,7 @@ from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.planning import Pace, Plan
 from wholebody.planning.ends import nearer
 from wholebody.planning.local_planner import Geodesics, TrackedMotions
-from wholebody.planning.multiplier_kernel import press
+from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, refined, shortcut
@@ -198,7 +198,7 @@ def test_multipliers_are_those_of_the_complementarity_problem() -> None:
     for rows, freedoms in ((1, 3), (8, 12), (40, 60)):
         derivative, gap = rng.normal(size=(rows, freedoms)), rng.normal(size=rows)
         response, force = derivative @ derivative.T, np.zeros(rows)
-        press(response, gap.copy(), force)
+        projected_gauss_seidel(response, gap.copy(), force)
         kept = gap + response @ force
         assert (force >= 0.0).all()
         assert kept.min() > -1e-3

@@ -12,7 +12,7 @@ from wholebody.base.compiled import compiled
 
 
 @compiled(fastmath=True)
-def press(response: Array, gap: Array, force: Array) -> None:
+def projected_gauss_seidel(response: Array, gap: Array, force: Array) -> None:
     """Change multipliers (m,), not negative, until no gap is negative, by sweeps over the rows (Gauss-Seidel).
 
     A gap (m,) is what it was, which is overwritten, and `response` (m, m) times the multipliers.
@@ -39,5 +39,5 @@ def press(response: Array, gap: Array, force: Array) -> None:
 
 def compiled_kernel() -> ModuleType:
     """This module, with its loop compiled or loaded from the cache."""
-    press(np.eye(1), np.zeros(1), np.zeros(1))
+    projected_gauss_seidel(np.eye(1), np.zeros(1), np.zeros(1))
     return sys.modules[__name__]

@@ -23,7 +23,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
-from wholebody.planning.multiplier_kernel import press
+from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.smoothing import banded, length
 
 DAMPING = 0.005  # m of the first program, and least; larger = shorter displacements, more programs
@@ -94,7 +94,7 @@ def _kept(free: Array, spread: Array, node: Indices, rows: tuple[Array, Array]) 
         at = np.flatnonzero(asked)
         response = spread[np.ix_(node[at], node[at])] * (derivative[at] @ derivative[at].T)
         given = force[at]
-        press(response, ahead[at], given)
+        projected_gauss_seidel(response, ahead[at], given)
         force[at] = given
         pushed = np.zeros_like(free)
         np.add.at(pushed, node[at], given[:, None] * derivative[at])
