@@ -23,7 +23,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, near_limits, share_below
+from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
@@ -152,7 +152,8 @@ class Articulated:
             self.velocity = impulse_kernel.by_inertia(driven, rest)
             mean = 0.5 * (begin + self.velocity)
             middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
-        bearing, parting = self._bear(driven, points, time)
+        points, bearing, parting = self._bear(driven, points, time)
+        blow = np.vstack([blow, np.zeros((len(bearing) - len(blow), 3))])
         impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
         pin.centerOfMass(model, self._data, self.q)
         momentum = masses_begun @ start + points.figure.T @ impulse.ravel()
@@ -227,22 +228,18 @@ class Articulated:
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
             pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
         bodies = np.unique(owner[owner < len(free)])
-        freedom, sign, room = near_limits(model, self._limited, self.q, self.velocity, time)
-        count, self.points = len(owner), len(owner) + len(freedom)
-        made = Points.room(self.points, model.nv, [self._names[k] for k in bodies.tolist()], engine)
-        made.axes[:count], made.place[:count], made.gap[:count] = axes_of(normal), place, gap
-        directions = np.concatenate([made.axes[:count], cross(place[:, None], made.axes[:count])], axis=2)
+        made = Points.room(len(owner), model.nv, [self._names[k] for k in bodies.tolist()], engine)
+        made.axes[:], made.place[:], made.gap[:] = axes_of(normal), place, gap
+        directions = np.concatenate([made.axes, cross(place[:, None], made.axes)], axis=2)
         joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
         made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
-        made.restitution[:count], made.friction[:count] = self._surfaces(owner)
+        made.restitution[:], made.friction[:] = self._surfaces(owner)
         slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
         slot[bodies] = np.arange(len(bodies))
         centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
         made.add_things(owner, slot, centres, twists, directions)
-        made.figure[3 * np.arange(count, self.points), freedom], made.gap[count:] = sign, room
-        # each side of each freedom counts as a pair, before those of pieces
-        made.pair[:count], made.pair[count:] = 2 * model.nv + pair, 2 * freedom + (sign < 0.0)
-        return made
+        made.pair[:] = 2 * model.nv + pair  # after the limits
+        return made.with_limits(model, self._limited, self.q, 0.02 + 1.5 * time * np.abs(self.velocity))
 
     def _approach(self, moved: Array) -> Array:
         """How fast the pieces of every pair can approach each other (pairs,), m/s; `moved` (n, 6): see `_points`."""
@@ -277,37 +274,47 @@ class Articulated:
         hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
-        return self._solved(inertia, points, speed, target)[0] if hit.any() else np.zeros((len(target), 3))
+        if not hit.any():
+            return np.zeros((len(target), 3))
+        impulse = self._solved(inertia, points, speed, target)[0]
+        self._give(inertia, points, impulse)
+        return impulse
 
-    def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Array, Array]:
-        """Keep points apart at the end of a step; impulses (m, 3), and the velocities (3 m,) there."""
-        room = points.gap - SKIN  # a step removes a fifth of an overlap
-        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, 0.5))  # m/s, at most
-        speed = self._relative(points)
-        start = np.zeros((len(target), 3))
+    def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Points, Array, Array]:
+        """Keep points, and joints, apart at the end of a step: these, impulses (m, 3), velocities (3 m,) there."""
+        old, falling, found = self._old.over(time), 0.0, np.zeros((len(points.gap), 3))
+        solve_kernel.warm_start((old.pair, old.local, old.impulse), (points.pair, points.place), points.axes, found)
         if points.bodies and self._engine is not None:
             weights = np.array([self._engine.weight(name) for name in points.bodies])
-            fall = np.einsum("bij,bj->bi", points.responses[:, :, :3], weights)
-            speed = speed + time * (points.things @ fall.ravel())
-        old = self._old.over(time)
-        solve_kernel.warm_start((old.pair, old.local, old.impulse), (points.pair, points.place), points.axes, start)
-        found, after = self._solved(inertia, points, speed, target, start)
-        bearing = np.flatnonzero(found[:, 0] > 0.0)
+            falling = time * np.einsum("bij,bj->bi", points.responses[:, :, :3], weights).ravel()
+        for again in range(4):
+            room = points.gap - SKIN  # a step removes a fifth of an overlap
+            target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, 0.5))  # m/s, at most
+            speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
+            found, after = self._solved(inertia, points, speed, target, found)
+            # impulses turn joints towards limits that were far away
+            ahead = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ found.ravel())
+            reach = np.full(len(ahead), np.inf) if again == 2 else time * np.abs(ahead)
+            count, points = len(found), points.with_limits(self._model, self._limited, self.q, reach)
+            if len(points.gap) == count:
+                break
+            found = np.vstack([found, np.zeros((len(points.gap) - count, 3))])
+        self._give(inertia, points, found)
+        bearing, self.points = np.flatnonzero(found[:, 0] > 0.0), len(found)
         world = np.einsum("cr,crk->ck", found[bearing], points.axes[bearing])
         self._old = Impulses(points.pair[bearing], points.place[bearing], world, np.zeros((0, 3)), time)
-        return found, after
+        return points, found, after
 
     def _solved(
         self, inertia: Array, points: Points, speed: Array, target: Array, start: Array | None = None
     ) -> tuple[Array, Array]:
         """Impulses (m, 3) of least normal velocities from others, and these (3 m,); without a start, those of blows."""
-        impulse, kept = np.zeros((len(target), 3)), np.flatnonzero(target > -np.inf)
+        impulse, velocities, kept = np.zeros((len(target), 3)), speed.copy(), np.flatnonzero(target > -np.inf)
         if not len(kept):
-            return impulse, speed
+            return impulse, velocities
         rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        figure, things, begun = points.figure[rows], points.things[rows], speed[rows]
-        mobility = impulse_kernel.mobilities(inertia, figure)
-        impulse_kernel.add_bodies(mobility, things, points.responses)
+        begun, mobility = speed[rows], impulse_kernel.mobilities(inertia, points.figure[rows])
+        impulse_kernel.add_bodies(mobility, points.things[rows], points.responses)
         begin = None if start is None else start[kept]
         found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin)
         flat = found.ravel()
@@ -315,15 +322,16 @@ class Articulated:
         if start is None and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less
             found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
             after = begun + mobility @ found.ravel()
-        impulse[kept] = found
-        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, figure.T @ found.ravel())
-        for name, wrench in zip(points.bodies, (things.T @ found.ravel()).reshape(-1, 6), strict=True):
+        impulse[kept], velocities[rows] = found, after
+        return impulse, velocities
+
+    def _give(self, inertia: Array, points: Points, impulse: Array) -> None:
+        """Give impulses (m, 3) to the joints and to the things."""
+        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ impulse.ravel())
+        for name, wrench in zip(points.bodies, (points.things.T @ impulse.ravel()).reshape(-1, 6), strict=True):
             if wrench.any():
                 self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + wrench[:3]
-        velocities = speed.copy()
-        velocities[rows] = after
-        return impulse, velocities
 
     def _move(
         self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float

@@ -23,7 +23,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask, cross
+from wholebody.base.arrays import Array, Indices, Mask, cross, with_values
 from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
@@ -290,6 +290,21 @@ class Points(NamedTuple):
             given[: len(owner)] += sign * np.einsum("crk,ck->cr", directions, twists[whose])
             self.driven[: len(owner)] |= moving[whose]
 
+    def with_limits(self, model: pin.Model, limited: Indices, q: Array, reach: Array) -> Points:
+        """These and the limits within reaches (nv,) at a posture; of `limited` (k, 2): places in q, in the velocity."""
+        at, freedom = limited.T
+        room: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
+        pair = 2 * freedom + np.array([[0], [1]])  # each side of each freedom, before the pairs of pieces
+        side, which = np.nonzero((room < reach[freedom]) & ~np.isin(pair, self.pair))
+        if not len(side):
+            return self
+        more = Points.room(len(side), model.nv, self.bodies, None)
+        more.figure[3 * np.arange(len(side)), freedom[which]] = np.array([1.0, -1.0])[side]
+        more.gap[:], more.pair[:] = room[side, which], pair[side, which]
+        both = (self[:-2], more[:-2])
+        joined = {name: np.concatenate(arrays) for name, *arrays in zip(Points._fields[:-2], *both, strict=True)}
+        return with_values(self, **joined)
+
     def held(self, impulse: Array) -> set[str]:
         """Names of the bodies that impulses (m, 3) act on."""
         acted = self.things.reshape(len(self.gap), 3, len(self.bodies), 6)[impulse.any(axis=1)].any(axis=(0, 1, 3))
@@ -301,16 +316,6 @@ def axes_of(normal: Array) -> Array:
     first = cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1)[:, None]
     return np.stack([normal, first, cross(normal, first)], axis=1)
-
-
-def near_limits(
-    model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
-) -> tuple[Indices, Array, Array]:
-    """Of `limited` (k, 2): places in q, velocity: that can come to a limit, the sign away from it, and how far."""
-    at, freedom = limited.T
-    gaps: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
-    side, which = np.nonzero(gaps < 0.02 + 1.5 * time * np.abs(velocity[freedom]))  # rad, m
-    return freedom[which], np.array([1.0, -1.0])[side], gaps[side, which]
 
 
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
