@@ -25,6 +25,7 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below
 from wholebody.dynamics.frame import EngineFrame, impacts
+from wholebody.dynamics.free_motion import Springs, free_motion
 from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN, Impulses
@@ -141,17 +142,8 @@ class Articulated:
         blow = self._bounce(masses_begun, points)
         time = self._until_impact(points, min(time, STEP) if points.bodies else time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
-        soft = time * self.damping + time * time * self.stiffness
-        middle, mean = self.q, begin
-        for _ in range(2):  # first with the forces at the start, then those half way
-            weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, middle)).copy()
-            forces = np.asarray(pin.nonLinearEffects(model, self._data, middle, mean)).copy()
-            masses, borne = self._inertia(middle), np.where(self.stiffness > 0.0, weight, 0.0)
-            driven = masses + np.diag(soft)
-            rest = masses @ begin + time * (self.stiffness * apart - forces + borne) + soft * steady
-            self.velocity = impulse_kernel.by_inertia(driven, rest)
-            mean = 0.5 * (begin + self.velocity)
-            middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
+        springs = Springs(self.stiffness, self.damping, apart, steady)
+        driven, self.velocity, mean, borne = free_motion(model, self._data, self._inertia, self.q, begin, time, springs)
         points, bearing, parting = self._bear(driven, points, time)
         blow = np.vstack([blow, np.zeros((len(bearing) - len(blow), 3))])
         impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
