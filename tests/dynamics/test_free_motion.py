@@ -27,7 +27,7 @@ def test_a_step_at_axes_that_nearly_align_makes_no_energy() -> None:
         velocity = vectors[:, :20] @ rng.normal(size=20)  # fast turns of little inertia
         velocity *= np.sqrt(20.0 / (velocity @ masses @ velocity))
         motion = free_motion(model, data, inertia, q, velocity, 1.0 / 120.0, springs)
-        most = max(most, 0.5 * motion.velocity @ motion.inertia @ motion.velocity)
+        most = max(most, float(0.5 * motion.velocity @ motion.inertia @ motion.velocity))
         aligned += int(values[0] < 1e-4)
     assert aligned > 10
     assert most < 30.0  # J, of 10; 42 kJ with the forces of motion

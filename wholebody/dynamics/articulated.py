@@ -84,8 +84,9 @@ class Articulated:
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        # 12 steps may be made again to end at an impact: what is squeezed meets thousands
-        now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, 12, {}, [], []
+        # 12 steps may be made again to end at an impact, and 24 of 1/60 s end early: what is squeezed meets thousands
+        now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
+        self.impulses, self.frames, self.ends = {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
@@ -127,7 +128,8 @@ class Articulated:
             if not met or done <= SHORTEST or self._stops <= 0 or back is None:
                 self.frames += [] if frame is None else [frame]
                 return done
-            self._stops -= 1
+            # what is squeezed meets it again and again
+            self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
             most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
             (self.q, self.velocity, self._old), self.impulses = figure, impulses.copy()
             back()
@@ -156,6 +158,7 @@ class Articulated:
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | pressed, after, mean)
+        moves *= points.share(moves)  # what a program that is not solved leaves
         first, last = points.figure @ (0.5 * (start + begin)), points.figure @ after
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # what parts an overlap has its energy from nowhere
@@ -257,8 +260,11 @@ class Articulated:
         """The time to the first impact if that comes within a time."""
         speed = self._relative(points)[::3]
         coming = (speed < -BOUNCE) & (points.gap > SHORTEST * -speed) & (points.restitution > 0.0)
-        hits = (points.gap[coming] - SKIN) / -speed[coming]
-        return min(time, max(float(hits.min(initial=time)), SHORTEST))
+        first = float(((points.gap[coming] - SKIN) / -speed[coming]).min(initial=time))
+        if first >= time or self._early <= 0:  # then impacts are part of the program, and do not bounce
+            return time
+        self._early -= 1
+        return max(first, SHORTEST)
 
     def _bounce(self, inertia: Array, points: Points) -> Array:
         speed = self._relative(points)

@@ -305,6 +305,12 @@ class Points(NamedTuple):
         joined = {name: np.concatenate(arrays) for name, *arrays in zip(Points._fields[:-2], *both, strict=True)}
         return with_values(self, **joined)
 
+    def share(self, way: Array) -> float:
+        """The share of a way (nv,) that takes no joint farther than 0.01 rad or m beyond a limit."""
+        limits = np.flatnonzero(self.pair < 2 * len(way))
+        beyond, room = -(self.figure[3 * limits] @ way), np.maximum(self.gap[limits] + 0.01, 1e-4)
+        return float((room / np.maximum(beyond, room)).min(initial=1.0))
+
     def held(self, impulse: Array) -> set[str]:
         """Names of the bodies that impulses (m, 3) act on."""
         acted = self.things.reshape(len(self.gap), 3, len(self.bodies), 6)[impulse.any(axis=1)].any(axis=(0, 1, 3))
