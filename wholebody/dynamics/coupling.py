@@ -302,7 +302,7 @@ class Points(NamedTuple):
         more.figure[3 * np.arange(len(side)), freedom[which]] = np.array([1.0, -1.0])[side]
         more.gap[:], more.pair[:] = room[side, which], pair[side, which]
         both = (self[:-2], more[:-2])
-        joined = {name: np.concatenate(arrays) for name, *arrays in zip(Points._fields[:-2], *both, strict=True)}
+        joined = {name: np.concatenate(arrays) for name, *arrays in zip(self._fields[:-2], *both, strict=True)}
         return with_values(self, **joined)
 
     def share(self, way: Array) -> float:
