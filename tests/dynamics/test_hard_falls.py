@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.dynamics.articulated import Articulated
+from wholebody.dynamics.coupling import Points
 
 
 def falling(name: str, seed: int, boxes: bool, stiffness: float = 0.0) -> wb.World:
@@ -44,3 +48,42 @@ def test_a_box_that_limbs_squeeze_does_not_make_a_frame_endless() -> None:
         assert frame.engine is not None
         steps = max(steps, frame.engine.steps)
     assert steps < 200  # 644
+
+
+@pytest.mark.parametrize("speed", [5.0, 30.0, 60.0])
+def test_no_step_turns_a_limb_so_far_that_it_ends_in_what_it_meets(tmp_path: Path, speed: float) -> None:
+    """Gaps are linear in a step: of a rod of 1 m that turns by 0.15 rad they are off by 0.15**2 / 2 = 11 mm at most."""
+    path = tmp_path / "rod.urdf"
+    path.write_text(
+        """<robot name="rod"><link name="base"/><link name="rod"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>
+        <inertia ixx="0.01" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+        <collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.04 0.04"/></geometry></collision></link>
+        <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint>
+        </robot>"""
+    )
+    rod = wb.load(path)
+    limp = wb.Actuated(rod, stiffness=0.0, damping=0.0)
+    moving = Articulated(wb.Scene(rod), rod.neutral, limp, None, gravity=np.zeros(3))
+    moving.velocity[:] = speed
+    moving.advance(rod.neutral, 1.0 / 60.0, {}, {})
+    assert speed * np.diff([0.0, *moving.ends]).max() < 0.15 + 1e-9
+    assert len(moving.ends) < 12
+    assert moving.velocity == pytest.approx(speed)
+
+
+def test_ways_end_within_the_tolerance_of_limits_however_often_they_lead_out() -> None:
+    figure = wb.load("hand")
+    model, q = figure.model, figure.neutral.copy()
+    joint = model.joints[model.njoints - 1]
+    single, way = np.array([[joint.idx_q, joint.idx_v]]), np.zeros(model.nv)
+    for side in (-1.0, 1.0):
+        q[joint.idx_q], way[joint.idx_v] = 0.0, side * 0.3  # rad
+        for _ in range(300):
+            points = Points.room(0, model.nv, [], None).with_limits(model, single, q, np.full(model.nv, np.inf))
+            q[joint.idx_q] += points.share(way) * way[joint.idx_v]
+        limit = model.upperPositionLimit if side > 0.0 else model.lowerPositionLimit
+        assert 0.01 - 1e-9 < side * (q[joint.idx_q] - limit[joint.idx_q]) < 0.02
+    q[joint.idx_q] += 0.5  # placed beyond, it may come back
+    points = Points.room(0, model.nv, [], None).with_limits(model, single, q, np.full(model.nv, np.inf))
+    assert points.share(-way) == 1.0
+    assert points.share(way) < 1e-9

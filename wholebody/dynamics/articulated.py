@@ -23,7 +23,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below
+from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below, turned
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.free_motion import Springs, free_motion
 from wholebody.dynamics.pieces import Surfaces, places
@@ -84,7 +84,7 @@ class Articulated:
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        # 12 steps may be made again to end at an impact, and 24 of 1/60 s end early: what is squeezed meets thousands
+        # so often steps may be made again to end at an impact, or end early: what is squeezed meets thousands
         now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
         self.impulses, self.frames, self.ends = {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
@@ -125,14 +125,20 @@ class Articulated:
         while True:
             done, frame = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
-            if not met or done <= SHORTEST or self._stops <= 0 or back is None:
+            angle = turned(self._workspace, figure[0], self.q)
+            far = angle > 0.15  # rad: gaps are not linear in such a way
+            if far and done > STEP:
+                most = STEP
+            elif (met or (far and back is None)) and done > SHORTEST and self._stops > 0:
+                # what is squeezed meets it again and again
+                self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
+                most = max(SHORTEST, min(0.98 * min(met, default=done), 0.7 * done, 0.14 * done / max(angle, 0.14)))
+            else:
                 self.frames += [] if frame is None else [frame]
                 return done
-            # what is squeezed meets it again and again
-            self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
-            most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
             (self.q, self.velocity, self._old), self.impulses = figure, impulses.copy()
-            back()
+            if back is not None:
+                back()
 
     def _attempt(
         self, time: float, planned: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]

@@ -33,6 +33,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.pieces import ENDLESS
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
+from wholebody.scene.workspace import Workspace
 
 Gains = float | Mapping[str, float] | None
 MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
@@ -306,9 +307,10 @@ class Points(NamedTuple):
         return with_values(self, **joined)
 
     def share(self, way: Array) -> float:
-        """The share of a way (nv,) that takes no joint farther than 0.01 rad or m beyond a limit."""
+        """The share of a way (nv,) that takes no joint farther than 0.01 rad or m beyond a limit, or ever 0.02."""
         limits = np.flatnonzero(self.pair < 2 * len(way))
-        beyond, room = -(self.figure[3 * limits] @ way), np.maximum(self.gap[limits] + 0.01, 1e-4)
+        beyond, gap = -(self.figure[3 * limits] @ way), self.gap[limits]
+        room = np.maximum(np.maximum(gap + 0.01, 0.01 * (gap + 0.02)), 1e-12)
         return float((room / np.maximum(beyond, room)).min(initial=1.0))
 
     def held(self, impulse: Array) -> set[str]:
@@ -332,6 +334,13 @@ def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
     linear, spin = relative[:, :3] + cross(relative[:, 3:], centres[smaller]), relative[:, 3:]
     reach = np.minimum(table.reach[smaller], ENDLESS)
     return np.asarray(np.sqrt((linear**2).sum(axis=1)) + reach * np.sqrt((spin**2).sum(axis=1)))
+
+
+def turned(workspace: Workspace, before: Array, after: Array) -> float:
+    """By how much any piece of a figure turns between two postures (nq,), radians."""
+    placed = (workspace.proximity.place(workspace.state.update(q).data)[:, :3].copy() for q in (before, after))
+    cosine = 0.5 * (np.einsum("kij,kij->k", *placed) - 1.0)
+    return float(np.arccos(np.clip(cosine.min(initial=1.0), -1.0, 1.0)))
 
 
 def drift(
