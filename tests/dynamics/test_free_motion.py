@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.dynamics.free_motion import Springs, free_motion
+from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 
 
 def test_a_step_at_axes_that_nearly_align_makes_no_energy() -> None:
@@ -31,3 +31,13 @@ def test_a_step_at_axes_that_nearly_align_makes_no_energy() -> None:
         aligned += int(values[0] < 1e-4)
     assert aligned > 10
     assert most < 30.0  # J, of 10; 42 kJ with the forces of motion
+
+
+def test_axes_that_can_align_are_those_of_three_hinges_in_a_point() -> None:
+    figure = wb.load("avatar")
+    found = aligning(figure.model)
+    names = {name for name in figure.joints if found[figure.model.joints[figure.joint_id(name)].idx_v]}
+    for joint in ("left_shoulder", "right_hip"):
+        assert {f"{joint}_flexion", f"{joint}_rotation"} < names
+    assert not any("elbow" in name or "abduction" in name for name in names)
+    assert not aligning(wb.load("hand").model).any()

@@ -25,7 +25,7 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below, turned
 from wholebody.dynamics.frame import EngineFrame, impacts
-from wholebody.dynamics.free_motion import Springs, free_motion
+from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN, Impulses
@@ -69,8 +69,9 @@ class Articulated:
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
         self._asked, self._masses = b"", np.zeros((0, 0))
-        light = pin.crba(self._model, self._data, self.q).diagonal() < 1e-5  # kg m2: of links without mass
-        self._model.armature += np.where(light, 1e-5, 0.0)
+        own = pin.crba(self._model, self._data, self.q).diagonal()
+        light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
+        self._model.armature += np.where(light, 1e-5, 1e-3 * own * aligning(self._model))
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
         free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
         driven = (self.stiffness > 0.0) | (self.damping > 0.0)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.dynamics.impulse_kernel import by_inertia
 
 
@@ -64,3 +64,20 @@ def free_motion(
     motion, _ = ended(q, begin)  # first with the forces at the start, then those half way
     motion, excess = ended(np.asarray(pin.integrate(model, q, 0.5 * time * motion.mean)), motion.mean)
     return motion if excess <= 0.0 else ended(q, np.zeros(model.nv))[0]
+
+
+def aligning(model: pin.Model) -> Mask:
+    """Freedoms (nv,) of the first and the last of three hinges in a point, whose axes can align."""
+    found: Mask = np.zeros(model.nv, dtype=bool)
+    for last in range(1, model.njoints):
+        middle = model.parents[last]
+        first = model.parents[middle]
+        hinges = [model.joints[k] for k in (first, middle, last)]
+        apart = max(np.abs(model.jointPlacements[k].translation).max() for k in (middle, last))
+        if (
+            first
+            and apart < 1e-9
+            and all(hinge.nv == 1 and hinge.shortname().startswith("JointModelR") for hinge in hinges)
+        ):
+            found[[hinges[0].idx_v, hinges[2].idx_v]] = True
+    return found
