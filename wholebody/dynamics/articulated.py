@@ -23,8 +23,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, near_limits, share_below
+from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below, turned
 from wholebody.dynamics.frame import EngineFrame, impacts
+from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN, Impulses
@@ -68,8 +69,9 @@ class Articulated:
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
         self._asked, self._masses = b"", np.zeros((0, 0))
-        light = pin.crba(self._model, self._data, self.q).diagonal() < 1e-5  # kg m2: of links without mass
-        self._model.armature += np.where(light, 1e-5, 0.0)
+        own = pin.crba(self._model, self._data, self.q).diagonal()
+        light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
+        self._model.armature += np.where(light, 1e-5, 1e-3 * own * aligning(self._model))
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
         free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
         driven = (self.stiffness > 0.0) | (self.damping > 0.0)
@@ -83,8 +85,9 @@ class Articulated:
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        # 12 steps may be made again to end at an impact: what is squeezed meets thousands
-        now, left, self._stops, self.impulses, self.frames, self.ends = 0.0, dt, 12, {}, [], []
+        # so often steps may be made again to end at an impact, or end early: what is squeezed meets thousands
+        now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
+        self.impulses, self.frames, self.ends = {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
             motions = {name: tuple(pin.SE3.Interpolate(*way, s) for s in shares) for name, way in moved.items()}
@@ -123,13 +126,20 @@ class Articulated:
         while True:
             done, frame = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
-            if not met or done <= SHORTEST or self._stops <= 0 or back is None:
+            angle = turned(self._workspace, figure[0], self.q)
+            far = angle > 0.15  # rad: gaps are not linear in such a way
+            if far and done > STEP:
+                most = STEP
+            elif (met or (far and back is None)) and done > SHORTEST and self._stops > 0:
+                # what is squeezed meets it again and again
+                self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
+                most = max(SHORTEST, min(0.98 * min(met, default=done), 0.7 * done, 0.14 * done / max(angle, 0.14)))
+            else:
                 self.frames += [] if frame is None else [frame]
                 return done
-            self._stops -= 1
-            most = max(SHORTEST, min(0.98 * min(met), 0.7 * done))
             (self.q, self.velocity, self._old), self.impulses = figure, impulses.copy()
-            back()
+            if back is not None:
+                back()
 
     def _attempt(
         self, time: float, planned: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]
@@ -141,18 +151,10 @@ class Articulated:
         blow = self._bounce(masses_begun, points)
         time = self._until_impact(points, min(time, STEP) if points.bodies else time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
-        soft = time * self.damping + time * time * self.stiffness
-        middle, mean = self.q, begin
-        for _ in range(2):  # first with the forces at the start, then those half way
-            weight = np.asarray(pin.computeGeneralizedGravity(model, self._data, middle)).copy()
-            forces = np.asarray(pin.nonLinearEffects(model, self._data, middle, mean)).copy()
-            masses, borne = self._inertia(middle), np.where(self.stiffness > 0.0, weight, 0.0)
-            driven = masses + np.diag(soft)
-            rest = masses @ begin + time * (self.stiffness * apart - forces + borne) + soft * steady
-            self.velocity = impulse_kernel.by_inertia(driven, rest)
-            mean = 0.5 * (begin + self.velocity)
-            middle = np.asarray(pin.integrate(model, self.q, 0.5 * time * mean))
-        bearing, parting = self._bear(driven, points, time)
+        springs = Springs(self.stiffness, self.damping, apart, steady)
+        driven, self.velocity, mean, borne = free_motion(model, self._data, self._inertia, self.q, begin, time, springs)
+        points, bearing, parting = self._bear(driven, points, time)
+        blow = np.vstack([blow, np.zeros((len(bearing) - len(blow), 3))])
         impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
         pin.centerOfMass(model, self._data, self.q)
         momentum = masses_begun @ start + points.figure.T @ impulse.ravel()
@@ -163,6 +165,7 @@ class Articulated:
         motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
         # springs and contacts are implicit; what is free of them moves by the mean of both velocities
         moves = time * np.where((self.stiffness > 0.0) | pressed, after, mean)
+        moves *= points.share(moves)  # what a program that is not solved leaves
         first, last = points.figure @ (0.5 * (start + begin)), points.figure @ after
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # what parts an overlap has its energy from nowhere
@@ -227,22 +230,18 @@ class Articulated:
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
             pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
         bodies = np.unique(owner[owner < len(free)])
-        freedom, sign, room = near_limits(model, self._limited, self.q, self.velocity, time)
-        count, self.points = len(owner), len(owner) + len(freedom)
-        made = Points.room(self.points, model.nv, [self._names[k] for k in bodies.tolist()], engine)
-        made.axes[:count], made.place[:count], made.gap[:count] = axes_of(normal), place, gap
-        directions = np.concatenate([made.axes[:count], cross(place[:, None], made.axes[:count])], axis=2)
+        made = Points.room(len(owner), model.nv, [self._names[k] for k in bodies.tolist()], engine)
+        made.axes[:], made.place[:], made.gap[:] = axes_of(normal), place, gap
+        directions = np.concatenate([made.axes, cross(place[:, None], made.axes)], axis=2)
         joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
         made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
-        made.restitution[:count], made.friction[:count] = self._surfaces(owner)
+        made.restitution[:], made.friction[:] = self._surfaces(owner)
         slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
         slot[bodies] = np.arange(len(bodies))
         centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
         made.add_things(owner, slot, centres, twists, directions)
-        made.figure[3 * np.arange(count, self.points), freedom], made.gap[count:] = sign, room
-        # each side of each freedom counts as a pair, before those of pieces
-        made.pair[:count], made.pair[count:] = 2 * model.nv + pair, 2 * freedom + (sign < 0.0)
-        return made
+        made.pair[:] = 2 * model.nv + pair  # after the limits
+        return made.with_limits(model, self._limited, self.q, 0.02 + 1.5 * time * np.abs(self.velocity))
 
     def _approach(self, moved: Array) -> Array:
         """How fast the pieces of every pair can approach each other (pairs,), m/s; `moved` (n, 6): see `_points`."""
@@ -268,8 +267,11 @@ class Articulated:
         """The time to the first impact if that comes within a time."""
         speed = self._relative(points)[::3]
         coming = (speed < -BOUNCE) & (points.gap > SHORTEST * -speed) & (points.restitution > 0.0)
-        hits = (points.gap[coming] - SKIN) / -speed[coming]
-        return min(time, max(float(hits.min(initial=time)), SHORTEST))
+        first = float(((points.gap[coming] - SKIN) / -speed[coming]).min(initial=time))
+        if first >= time or self._early <= 0:  # then impacts are part of the program, and do not bounce
+            return time
+        self._early -= 1
+        return max(first, SHORTEST)
 
     def _bounce(self, inertia: Array, points: Points) -> Array:
         speed = self._relative(points)
@@ -277,37 +279,47 @@ class Articulated:
         hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
-        return self._solved(inertia, points, speed, target)[0] if hit.any() else np.zeros((len(target), 3))
+        if not hit.any():
+            return np.zeros((len(target), 3))
+        impulse = self._solved(inertia, points, speed, target)[0]
+        self._give(inertia, points, impulse)
+        return impulse
 
-    def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Array, Array]:
-        """Keep points apart at the end of a step; impulses (m, 3), and the velocities (3 m,) there."""
-        room = points.gap - SKIN  # a step removes a fifth of an overlap
-        target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, 0.5))  # m/s, at most
-        speed = self._relative(points)
-        start = np.zeros((len(target), 3))
+    def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Points, Array, Array]:
+        """Keep points, and joints, apart at the end of a step: these, impulses (m, 3), velocities (3 m,) there."""
+        old, falling, found = self._old.over(time), 0.0, np.zeros((len(points.gap), 3))
+        solve_kernel.warm_start((old.pair, old.local, old.impulse), (points.pair, points.place), points.axes, found)
         if points.bodies and self._engine is not None:
             weights = np.array([self._engine.weight(name) for name in points.bodies])
-            fall = np.einsum("bij,bj->bi", points.responses[:, :, :3], weights)
-            speed = speed + time * (points.things @ fall.ravel())
-        old = self._old.over(time)
-        solve_kernel.warm_start((old.pair, old.local, old.impulse), (points.pair, points.place), points.axes, start)
-        found, after = self._solved(inertia, points, speed, target, start)
-        bearing = np.flatnonzero(found[:, 0] > 0.0)
+            falling = time * np.einsum("bij,bj->bi", points.responses[:, :, :3], weights).ravel()
+        for again in range(4):
+            room = points.gap - SKIN  # a step removes a fifth of an overlap
+            target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, 0.5))  # m/s, at most
+            speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
+            found, after = self._solved(inertia, points, speed, target, found)
+            # impulses turn joints towards limits that were far away
+            ahead = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ found.ravel())
+            reach = np.full(len(ahead), np.inf) if again == 2 else time * np.abs(ahead)
+            count, points = len(found), points.with_limits(self._model, self._limited, self.q, reach)
+            if len(points.gap) == count:
+                break
+            found = np.vstack([found, np.zeros((len(points.gap) - count, 3))])
+        self._give(inertia, points, found)
+        bearing, self.points = np.flatnonzero(found[:, 0] > 0.0), len(found)
         world = np.einsum("cr,crk->ck", found[bearing], points.axes[bearing])
         self._old = Impulses(points.pair[bearing], points.place[bearing], world, np.zeros((0, 3)), time)
-        return found, after
+        return points, found, after
 
     def _solved(
         self, inertia: Array, points: Points, speed: Array, target: Array, start: Array | None = None
     ) -> tuple[Array, Array]:
         """Impulses (m, 3) of least normal velocities from others, and these (3 m,); without a start, those of blows."""
-        impulse, kept = np.zeros((len(target), 3)), np.flatnonzero(target > -np.inf)
+        impulse, velocities, kept = np.zeros((len(target), 3)), speed.copy(), np.flatnonzero(target > -np.inf)
         if not len(kept):
-            return impulse, speed
+            return impulse, velocities
         rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        figure, things, begun = points.figure[rows], points.things[rows], speed[rows]
-        mobility = impulse_kernel.mobilities(inertia, figure)
-        impulse_kernel.add_bodies(mobility, things, points.responses)
+        begun, mobility = speed[rows], impulse_kernel.mobilities(inertia, points.figure[rows])
+        impulse_kernel.add_bodies(mobility, points.things[rows], points.responses)
         begin = None if start is None else start[kept]
         found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin)
         flat = found.ravel()
@@ -315,15 +327,16 @@ class Articulated:
         if start is None and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less
             found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
             after = begun + mobility @ found.ravel()
-        impulse[kept] = found
-        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, figure.T @ found.ravel())
-        for name, wrench in zip(points.bodies, (things.T @ found.ravel()).reshape(-1, 6), strict=True):
+        impulse[kept], velocities[rows] = found, after
+        return impulse, velocities
+
+    def _give(self, inertia: Array, points: Points, impulse: Array) -> None:
+        """Give impulses (m, 3) to the joints and to the things."""
+        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ impulse.ravel())
+        for name, wrench in zip(points.bodies, (points.things.T @ impulse.ravel()).reshape(-1, 6), strict=True):
             if wrench.any():
                 self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + wrench[:3]
-        velocities = speed.copy()
-        velocities[rows] = after
-        return impulse, velocities
 
     def _move(
         self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float

@@ -23,7 +23,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask, cross
+from wholebody.base.arrays import Array, Indices, Mask, cross, with_values
 from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
@@ -33,6 +33,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.pieces import ENDLESS
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
+from wholebody.scene.workspace import Workspace
 
 Gains = float | Mapping[str, float] | None
 MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
@@ -290,6 +291,28 @@ class Points(NamedTuple):
             given[: len(owner)] += sign * np.einsum("crk,ck->cr", directions, twists[whose])
             self.driven[: len(owner)] |= moving[whose]
 
+    def with_limits(self, model: pin.Model, limited: Indices, q: Array, reach: Array) -> Points:
+        """These and the limits within reaches (nv,) at a posture; of `limited` (k, 2): places in q, in the velocity."""
+        at, freedom = limited.T
+        room: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
+        pair = 2 * freedom + np.array([[0], [1]])  # each side of each freedom, before the pairs of pieces
+        side, which = np.nonzero((room < reach[freedom]) & ~np.isin(pair, self.pair))
+        if not len(side):
+            return self
+        more = Points.room(len(side), model.nv, self.bodies, None)
+        more.figure[3 * np.arange(len(side)), freedom[which]] = np.array([1.0, -1.0])[side]
+        more.gap[:], more.pair[:] = room[side, which], pair[side, which]
+        both = (self[:-2], more[:-2])
+        joined = {name: np.concatenate(arrays) for name, *arrays in zip(self._fields[:-2], *both, strict=True)}
+        return with_values(self, **joined)
+
+    def share(self, way: Array) -> float:
+        """The share of a way (nv,) that takes no joint farther than 0.01 rad or m beyond a limit, or ever 0.02."""
+        limits = np.flatnonzero(self.pair < 2 * len(way))
+        beyond, gap = -(self.figure[3 * limits] @ way), self.gap[limits]
+        room = np.maximum(np.maximum(gap + 0.01, 0.01 * (gap + 0.02)), 1e-12)
+        return float((room / np.maximum(beyond, room)).min(initial=1.0))
+
     def held(self, impulse: Array) -> set[str]:
         """Names of the bodies that impulses (m, 3) act on."""
         acted = self.things.reshape(len(self.gap), 3, len(self.bodies), 6)[impulse.any(axis=1)].any(axis=(0, 1, 3))
@@ -303,16 +326,6 @@ def axes_of(normal: Array) -> Array:
     return np.stack([normal, first, cross(normal, first)], axis=1)
 
 
-def near_limits(
-    model: pin.Model, limited: Indices, q: Array, velocity: Array, time: float
-) -> tuple[Indices, Array, Array]:
-    """Of `limited` (k, 2): places in q, velocity: that can come to a limit, the sign away from it, and how far."""
-    at, freedom = limited.T
-    gaps: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
-    side, which = np.nonzero(gaps < 0.02 + 1.5 * time * np.abs(velocity[freedom]))  # rad, m
-    return freedom[which], np.array([1.0, -1.0])[side], gaps[side, which]
-
-
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
     """Bounds (pairs,) [m/s] of the approach of pieces with `centres` (n, 3) and twists (n, 6) at the origin."""
     first, second = table.pairs.T
@@ -321,6 +334,13 @@ def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
     linear, spin = relative[:, :3] + cross(relative[:, 3:], centres[smaller]), relative[:, 3:]
     reach = np.minimum(table.reach[smaller], ENDLESS)
     return np.asarray(np.sqrt((linear**2).sum(axis=1)) + reach * np.sqrt((spin**2).sum(axis=1)))
+
+
+def turned(workspace: Workspace, before: Array, after: Array) -> float:
+    """By how much any piece of a figure turns between two postures (nq,), radians."""
+    placed = (workspace.proximity.place(workspace.state.update(q).data)[:, :3].copy() for q in (before, after))
+    cosine = 0.5 * (np.einsum("kij,kij->k", *placed) - 1.0)
+    return float(np.arccos(np.clip(cosine.min(initial=1.0), -1.0, 1.0)))
 
 
 def drift(

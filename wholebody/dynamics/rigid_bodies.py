@@ -215,7 +215,8 @@ class RigidBodies:
         count = int(np.ceil(dt / STEP - 1e-9))
         # early ends of steps: eight for a dozen bodies, as each costs a step of all of them
         stops = 96 // max(12, int(state.bodies.moving.sum()))
-        record = FrameRecord(stops, np.zeros((len(self.names), 6)), work=self._pushed)
+        given_up = max(0, 3 - count)  # a frame of one step gives halving up once, others three times
+        record = FrameRecord(stops, np.zeros((len(self.names), 6)), work=self._pushed, given_up=given_up)
         self._pushed = 0.0
         self._find_near(dt / count)
         for number in range(count):
