@@ -267,6 +267,17 @@ def test_the_middle_of_a_run_leads_out_of_a_family_that_the_first_own_start_bega
     assert [float(np.sign(one.q[1])) for one in records] == [1.0] + [-1.0] * 15  # type: ignore[index]
 
 
+def test_what_a_method_leaves_out_of_any_problem_is_said_once(arm: wb.Figure) -> None:
+    """An arm has nothing by default; of a person who stands ccd does not look at the balance."""
+    human = wb.load("human")
+    there = human.placement(human.posture("standing"), "right_palm").translation
+    goals = [wb.Point("right_palm", there)]
+    person = wb.Problem(wb.Scene(human), "standing", goals=goals, balance=True)
+    with pytest.warns(UserWarning, match="leaves out") as told:
+        wb.solve_many([problem(arm, PLACES[0]), person, person], "ccd")
+    assert [str(one.message).split(",")[0] for one in told] == ["method 'ccd' leaves out Balance (by default)"]
+
+
 def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:
     reached, far = wb.solve_many([problem(arm, PLACES[0]), problem(arm, (5.0, 0.0, 0.5))])
     assert (reached.solved, far.outcome, far.neighbour) == (True, "unreachable", "")

@@ -74,10 +74,10 @@ def method_for_motions(given: object) -> Method:
     return made
 
 
-def warn_of_left_out(method: Method, problem: Problem, level: int) -> Method:
+def warn_of_left_out(method: Method, level: int, *problems: Problem) -> Method:
     """Say before anything is computed what a method does not look at; `level` as in `warnings.warn`, of the caller."""
-    names = method.leaves_out(problem) if hasattr(method, "leaves_out") else ()
-    if names:
+    left_out = getattr(method, "leaves_out", lambda problem: ())
+    if names := [*dict.fromkeys(name for problem in problems for name in left_out(problem))]:
         said = f"method {method.name!r} leaves out {listed(names)}, which the assessment alone judges; use method='qp'"
         warnings.warn(said, stacklevel=level + 1)
     return method
@@ -109,7 +109,7 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
     """
     check_problem(problem, "solve: problem")
     progress = function(progress, "progress")
-    solution = warn_of_left_out(as_method(method), problem, 2).solve(problem, progress)
+    solution = warn_of_left_out(as_method(method), 2, problem).solve(problem, progress)
     _warn_if_nothing_holds(problem, solution)
     return solution
 
