@@ -278,6 +278,21 @@ def test_what_a_method_leaves_out_of_any_problem_is_said_once(arm: wb.Figure) ->
     assert [str(one.message).split(",")[0] for one in told] == ["method 'ccd' leaves out Balance (by default)"]
 
 
+@pytest.mark.parametrize("method", ["newton", "dls"])
+def test_what_a_method_leaves_out_is_said_of_what_it_takes_alone(
+    method: str, arm: wb.Figure, recwarn: pytest.WarningsRecorder
+) -> None:
+    """A problem whose scene changed after it was stated, or with terms that a method refuses, is a record."""
+    scene = wb.Scene(arm).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=(2.0, 0.0, 1.0))
+    stale = wb.Problem(scene, goals=[wb.Point("hand", PLACES[0])], measures=[wb.Effort()])
+    scene.add(wb.Box((0.1, 0.1, 0.1)), name="other", at=(3.0, 0.0, 1.0))
+    above = wb.tasks.Plane("hand", (0, 0, 1), side="above")
+    refused = wb.Problem(wb.Scene(arm), goals=[wb.Point("hand", PLACES[0])], constraints=[above])
+    given = [stale] if method == "newton" else [stale, refused]  # newton takes the latter
+    assert {one.outcome for one in wb.solve_many(given, method)} == {"refused"}
+    assert not [one for one in recwarn if "leaves out" in str(one.message)]
+
+
 def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:
     reached, far = wb.solve_many([problem(arm, PLACES[0]), problem(arm, (5.0, 0.0, 0.5))])
     assert (reached.solved, far.outcome, far.neighbour) == (True, "unreachable", "")
