@@ -21,7 +21,7 @@ from wholebody.planning.local_planner import Geodesics, TrackedMotions
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
-from wholebody.planning.smoothing import length, refined, shortcut
+from wholebody.planning.smoothing import length, places, refined, shortcut
 from wholebody.planning.tightening import tighten
 
 
@@ -383,6 +383,26 @@ def test_a_joint_without_limits_goes_the_long_way_round(tmp_path: Path, least_di
     check(found, figure.neutral, end, Pace())
     assert found.length == pytest.approx(2.0 * np.pi - 2.5, rel=0.05)
     assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+CART = """<robot name="cart"><link name="ground"/>
+<link name="base"><collision><geometry><box size="0.5 0.2 0.2"/></geometry></collision></link>
+<joint name="move" type="planar"><parent link="ground"/><child link="base"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+def test_a_cart_goes_as_far_as_it_goes_and_turns_on_beyond_half_a_turn(tmp_path: Path) -> None:
+    path = tmp_path / "cart.urdf"
+    path.write_text(CART)
+    model = wb.load(path).model
+    driven = [np.array((0.0, 0.0, 1.0, 0.0))]
+    for _ in range(40):
+        driven.append(np.asarray(pin.integrate(model, driven[-1], np.array((0.1, 0.0, 0.14)))))
+    found = places(model, driven)
+    np.testing.assert_allclose(found[:, 2], 0.14 * np.arange(41), atol=1e-9)
+    for q, place in zip(driven, found, strict=True):
+        np.testing.assert_allclose(pin.integrate(model, driven[0], place), q, atol=1e-9)
+    far = np.asarray(pin.integrate(model, driven[0], np.array((5.0, 0.0, 0.0))))
+    np.testing.assert_allclose(places(model, [driven[0], far])[1], (5.0, 0.0, 0.0), atol=1e-12)
 
 
 class NoTrees(RRTConnect):
