@@ -15,6 +15,8 @@ import wholebody as wb
 from tests.audits.plan_scenes import hand_into_box, person_at_gap
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.figures.description import Description
+from wholebody.figures.figure import Figure
 from wholebody.planning import Pace, Plan
 from wholebody.planning.ends import nearer
 from wholebody.planning.local_planner import Geodesics, TrackedMotions
@@ -403,6 +405,43 @@ def test_a_cart_goes_as_far_as_it_goes_and_turns_on_beyond_half_a_turn(tmp_path:
         np.testing.assert_allclose(pin.integrate(model, driven[0], place), q, atol=1e-9)
     far = np.asarray(pin.integrate(model, driven[0], np.array((5.0, 0.0, 0.0))))
     np.testing.assert_allclose(places(model, [driven[0], far])[1], (5.0, 0.0, 0.0), atol=1e-12)
+
+
+def test_a_cart_goes_round_what_stands_between_far_from_the_origin(tmp_path: Path, least_distance: Distance) -> None:
+    path = tmp_path / "cart.urdf"
+    path.write_text(CART)
+    scene = wb.Scene(wb.load(path)).add(wb.Box((0.1, 1.0, 1.0)), name="wall", at=(10.7, 0.0, 0.0))
+    start, end = np.array((10.0, 0.0, 1.0, 0.0)), np.array((12.0, 0.75, 0.0, 1.0))
+    found = wb.plan(scene, start, end)
+    check(found, start, end, Pace())
+    assert found.length < 4.0
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_a_second_free_body_goes_round_a_wall(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:
+    figure = free_bodies(wb.Sphere(0.1), wb.Sphere(0.1))
+    scene = wb.Scene(figure).add(wb.Box((0.1, 3.0, 3.0)), name="wall")
+    start, end = figure.neutral.copy(), figure.neutral.copy()
+    start[:3] = end[:3] = -3.0, 0.0, 0.0
+    start[7:10], end[7:10] = (0.5, 0.8, 0.0), (-0.5, 0.8, 0.0)
+    found = wb.plan(scene, start, end)
+    check(found, start, end, Pace())
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_samples_of_a_ball_joint_turn_about_all_axes() -> None:
+    model, geometry = pin.Model(), pin.GeometryModel()
+    model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+    none = Description(
+        groups={}, chains={}, frames=(), segments=(), postures={"neutral": lambda own: pin.neutral(own.model)}
+    )
+    figure = Figure("ball", model, geometry, "own", none)
+    sampler, at = Sampler(wb.Problem(wb.Scene(figure)), np.random.default_rng(0)), pin.Quaternion(pin.exp3(np.ones(3)))
+    for spread in (1.0, 0.1):
+        turns = np.array([pin.difference(model, at.coeffs(), sampler.near(at.coeffs(), spread)) for _ in range(300)])
+        np.testing.assert_allclose(turns.mean(axis=0), 0.0, atol=0.3 * spread)
+        assert (np.abs(turns).max(axis=0) > 2.0 * spread).all()
+        assert np.linalg.norm(turns, axis=1).max() <= np.pi * spread + 1e-9
 
 
 class NoTrees(RRTConnect):
