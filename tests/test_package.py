@@ -158,6 +158,20 @@ def test_a_module_reads_nothing_private_of_another() -> None:
     assert not {name: reads for name, reads in found.items() if reads}
 
 
+CONSTANT = re.compile(r"`(?:[a-z_.]*?(\w+)\.)?([A-Z][A-Z0-9_]{2,})`")
+
+
+def test_constants_that_comments_name_exist() -> None:
+    """A number that moved to where it is used leaves its name in the words of others: `NAME`, or `module.NAME`."""
+    found = []
+    for name, text in modules().items():
+        for home, constant in CONSTANT.findall(text):
+            own = [other for key, other in modules().items() if key.split(".")[-1] == home] if home else [text]
+            used = [one for one in own if re.search(rf"\b{constant}\b", CONSTANT.sub("", one))]
+            found += [] if used or home in ("pin", "pinocchio") else [f"{name}: {constant}"]
+    assert not found
+
+
 def room_of(module: str) -> str | None:
     parts = module.split(".")
     return parts[1] if parts[0] == "wholebody" and len(parts) > 1 and parts[1] in ROOMS else None

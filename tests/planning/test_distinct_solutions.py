@@ -276,3 +276,14 @@ def test_without_a_time_limit_a_bound_of_the_processor_ends_it(arm: wb.Figure, m
     assert (found.starts, found.complete) == (1, False)
     assert "time limit" in found.ended
     assert wb.solutions(problem, time_limit=np.inf, starts=3).starts == 3
+
+
+def test_why_a_search_ended_does_not_contradict_that_there_may_be_more(planar_arm: Callable[..., wb.Figure]) -> None:
+    """Without goals the neighbours of the one minimum are answers; to what is behind a wall there is none."""
+    scene = wb.Scene(planar_arm((0.5, 0.4)))
+    loose = wb.solutions(wb.Problem(scene, np.array((0.2, 0.3))))
+    assert (loose.found, loose.complete) == (1, False)
+    assert str(loose).splitlines()[0].endswith("there may be more: neighbours of these meet the goals too")
+    scene.add(wb.Box((0.1, 4.0, 1.0)), name="wall", at=(0.4, 0.0, 0.0))
+    none = wb.solutions(wb.Problem(scene, np.array((2.0, 0.3)), goals=[wb.Point("tip", (0.7, 0.3, 0.0))]))
+    assert (none.found, none.starts, none.ended) == (0, 40, "the last 40 starts led to none")

@@ -15,13 +15,15 @@ import wholebody as wb
 from tests.audits.plan_scenes import hand_into_box, person_at_gap
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.figures.description import Description
+from wholebody.figures.figure import Figure
 from wholebody.planning import Pace, Plan
 from wholebody.planning.ends import nearer
 from wholebody.planning.local_planner import Geodesics, TrackedMotions
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
-from wholebody.planning.smoothing import length, refined, shortcut
+from wholebody.planning.smoothing import length, places, refined, shortcut
 from wholebody.planning.tightening import tighten
 
 
@@ -383,6 +385,63 @@ def test_a_joint_without_limits_goes_the_long_way_round(tmp_path: Path, least_di
     check(found, figure.neutral, end, Pace())
     assert found.length == pytest.approx(2.0 * np.pi - 2.5, rel=0.05)
     assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+CART = """<robot name="cart"><link name="ground"/>
+<link name="base"><collision><geometry><box size="0.5 0.2 0.2"/></geometry></collision></link>
+<joint name="move" type="planar"><parent link="ground"/><child link="base"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+def test_a_cart_goes_as_far_as_it_goes_and_turns_on_beyond_half_a_turn(tmp_path: Path) -> None:
+    path = tmp_path / "cart.urdf"
+    path.write_text(CART)
+    model = wb.load(path).model
+    driven = [np.array((0.0, 0.0, 1.0, 0.0))]
+    for _ in range(40):
+        driven.append(np.asarray(pin.integrate(model, driven[-1], np.array((0.1, 0.0, 0.14)))))
+    found = places(model, driven)
+    np.testing.assert_allclose(found[:, 2], 0.14 * np.arange(41), atol=1e-9)
+    for q, place in zip(driven, found, strict=True):
+        np.testing.assert_allclose(pin.integrate(model, driven[0], place), q, atol=1e-9)
+    far = np.asarray(pin.integrate(model, driven[0], np.array((5.0, 0.0, 0.0))))
+    np.testing.assert_allclose(places(model, [driven[0], far])[1], (5.0, 0.0, 0.0), atol=1e-12)
+
+
+def test_a_cart_goes_round_what_stands_between_far_from_the_origin(tmp_path: Path, least_distance: Distance) -> None:
+    path = tmp_path / "cart.urdf"
+    path.write_text(CART)
+    scene = wb.Scene(wb.load(path)).add(wb.Box((0.1, 1.0, 1.0)), name="wall", at=(10.7, 0.0, 0.0))
+    start, end = np.array((10.0, 0.0, 1.0, 0.0)), np.array((12.0, 0.75, 0.0, 1.0))
+    found = wb.plan(scene, start, end)
+    check(found, start, end, Pace())
+    assert found.length < 4.0
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_a_second_free_body_goes_round_a_wall(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:
+    figure = free_bodies(wb.Sphere(0.1), wb.Sphere(0.1))
+    scene = wb.Scene(figure).add(wb.Box((0.1, 3.0, 3.0)), name="wall")
+    start, end = figure.neutral.copy(), figure.neutral.copy()
+    start[:3] = end[:3] = -3.0, 0.0, 0.0
+    start[7:10], end[7:10] = (0.5, 0.8, 0.0), (-0.5, 0.8, 0.0)
+    found = wb.plan(scene, start, end)
+    check(found, start, end, Pace())
+    assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_samples_of_a_ball_joint_turn_about_all_axes() -> None:
+    model, geometry = pin.Model(), pin.GeometryModel()
+    model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+    none = Description(
+        groups={}, chains={}, frames=(), segments=(), postures={"neutral": lambda own: pin.neutral(own.model)}
+    )
+    figure = Figure("ball", model, geometry, "own", none)
+    sampler, at = Sampler(wb.Problem(wb.Scene(figure)), np.random.default_rng(0)), pin.Quaternion(pin.exp3(np.ones(3)))
+    for spread in (1.0, 0.1):
+        turns = np.array([pin.difference(model, at.coeffs(), sampler.near(at.coeffs(), spread)) for _ in range(300)])
+        np.testing.assert_allclose(turns.mean(axis=0), 0.0, atol=0.3 * spread)
+        assert (np.abs(turns).max(axis=0) > 2.0 * spread).all()
+        assert np.linalg.norm(turns, axis=1).max() <= np.pi * spread + 1e-9
 
 
 class NoTrees(RRTConnect):

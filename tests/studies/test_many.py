@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -250,6 +251,46 @@ def test_after_a_miss_the_last_solved_answer_is_the_start(arm: wb.Figure) -> Non
     assert (first.solved, far.solved, last.solved) == (True, False, True)
     # the first's own start; the second from the first's answer, and its own start; the third from the first's answer
     np.testing.assert_array_equal(begun[3], first.q)
+
+
+def test_the_middle_of_a_run_leads_out_of_a_family_that_the_first_own_start_began(
+    planar_arm: Callable[..., wb.Figure],
+) -> None:
+    """Elbows that all but the first case have on their own start's side; from the first's answer they stay."""
+    scene = wb.Scene(planar_arm((0.5, 0.4)))
+    places = [(0.6, 0.02 * k, 0.0) for k in range(16)]
+    starts = [np.array((-0.6, 1.4)), *[np.array((0.8, -1.4))] * 15]
+    problems = [
+        wb.Problem(scene, start, goals=[wb.Point("tip", place)]) for start, place in zip(starts, places, strict=True)
+    ]
+    records = wb.solve_many(problems, "newton", warm_start=True)
+    assert [float(np.sign(one.q[1])) for one in records] == [1.0] + [-1.0] * 15  # type: ignore[index]
+
+
+def test_what_a_method_leaves_out_of_any_problem_is_said_once(arm: wb.Figure) -> None:
+    """An arm has nothing by default; of a person who stands ccd does not look at the balance."""
+    human = wb.load("human")
+    there = human.placement(human.posture("standing"), "right_palm").translation
+    goals = [wb.Point("right_palm", there)]
+    person = wb.Problem(wb.Scene(human), "standing", goals=goals, balance=True)
+    with pytest.warns(UserWarning, match="leaves out") as told:
+        wb.solve_many([problem(arm, PLACES[0]), person, person], "ccd")
+    assert [str(one.message).split(",")[0] for one in told] == ["method 'ccd' leaves out Balance (by default)"]
+
+
+@pytest.mark.parametrize("method", ["newton", "dls"])
+def test_what_a_method_leaves_out_is_said_of_what_it_takes_alone(
+    method: str, arm: wb.Figure, recwarn: pytest.WarningsRecorder
+) -> None:
+    """A problem whose scene changed after it was stated, or with terms that a method refuses, is a record."""
+    scene = wb.Scene(arm).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=(2.0, 0.0, 1.0))
+    stale = wb.Problem(scene, goals=[wb.Point("hand", PLACES[0])], measures=[wb.Effort()])
+    scene.add(wb.Box((0.1, 0.1, 0.1)), name="other", at=(3.0, 0.0, 1.0))
+    above = wb.tasks.Plane("hand", (0, 0, 1), side="above")
+    refused = wb.Problem(wb.Scene(arm), goals=[wb.Point("hand", PLACES[0])], constraints=[above])
+    given = [stale] if method == "newton" else [stale, refused]  # newton takes the latter
+    assert {one.outcome for one in wb.solve_many(given, method)} == {"refused"}
+    assert not [one for one in recwarn if "leaves out" in str(one.message)]
 
 
 def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:

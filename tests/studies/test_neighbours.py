@@ -70,6 +70,21 @@ def test_a_case_solved_from_its_own_start_leads_out_of_a_higher_family_that_does
     assert max(asked.values()) <= TRIES
 
 
+def test_where_answers_of_neighbours_are_of_no_use_own_starts_lead_to_the_lower_family() -> None:
+    """Solves from the answers of others all fail, so that a jump moves by own starts alone."""
+    asked: Counter[int] = Counter()
+    given = family([1.0 if k < 15 else -1.0 for k in range(len(TILTS))], -0.5, asked)
+
+    def alone(function: Callable[..., Any], work: Any) -> dict[Any, Any]:
+        found = given.compute(function, work)
+        return {key: answer for key, answer in found.items() if work[key][1] is None}
+
+    assert not lower(given._replace(compute=alone))
+    for k, tilt in enumerate(TILTS):
+        assert given.done[k].q == pytest.approx(GRID[well(GRID, tilt).argmin()], abs=2e-3)
+    assert max(asked.values()) <= TRIES
+
+
 def test_a_posture_that_changes_continuously_costs_no_more_solves() -> None:
     asked: Counter[int] = Counter()
     given = family([1.0] * len(TILTS), 0.5, asked)

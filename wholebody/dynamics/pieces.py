@@ -270,7 +270,7 @@ class ContactFinder:
         owner = rows.contact
         normal = rows.wrench[:, :3].copy()
         point = places(rows.wrench, contacts, owner)
-        kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `TOUCH`
+        kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `step_program.TOUCH`
         owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]
         return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])

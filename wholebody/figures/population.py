@@ -38,7 +38,7 @@ dimensions that go together."""
 def odds(x: Array, low: Array | float, high: Array | float) -> Array:
     """Return the odds of values between two ends; of ends 0 and infinity, the values.
 
-    Of a value nearer to a finite end than `NEAR`, or beyond it, those of that distance from the end.
+    Of a value nearer to a finite end than two years, or beyond it, those of that distance from the end.
     """
     # few were measured within two years of an end of the ages: they have the dimensions of those at this distance
     inner = 2.0 * np.isfinite(high)

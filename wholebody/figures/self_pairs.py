@@ -102,7 +102,7 @@ def carriers_above(model: pin.Model, joint: Indices) -> Indices:
 
 
 def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array) -> dict[int, int]:
-    """Pairs that touch in all but a share `SELDOM` of these postures -> number of postures without contact."""
+    """Pairs that touch in all but a share of 0.02 of these postures -> number of postures without contact."""
     if not len(geometry.collisionPairs) or not len(postures):
         return {}
     data, results = model.createData(), pin.GeometryData(geometry)

@@ -148,7 +148,7 @@ class Cylinder(Shape):
 
 @dataclass(frozen=True)
 class Torus(Shape):
-    """A ring about z, centred at its origin, such as a steering wheel: `SECTORS` convex pieces around it.
+    """A ring about z, centred at its origin, such as a steering wheel: 24 convex pieces around it.
 
     On the outer side the pieces cover the ring; on the inner side a sector is as straight as a chord, and up to 0.9 %
     of the radius of the ring is missing at its ends.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.checks import function, shown
-from wholebody.base.errors import InputError, UnknownNameError, one_line
+from wholebody.base.errors import InputError, UnknownNameError, WholebodyError, one_line
 from wholebody.methods import METHODS
 from wholebody.methods.base import Method, check_problem, listed
 from wholebody.methods.control import Progress
@@ -74,13 +74,24 @@ def method_for_motions(given: object) -> Method:
     return made
 
 
-def warn_of_left_out(method: Method, problem: Problem, level: int) -> Method:
+def warn_of_left_out(method: Method, level: int, *problems: Problem) -> Method:
     """Say before anything is computed what a method does not look at; `level` as in `warnings.warn`, of the caller."""
-    names = method.leaves_out(problem) if hasattr(method, "leaves_out") else ()
-    if names:
+    if names := [*dict.fromkeys(name for problem in problems for name in _left_out(method, problem))]:
         said = f"method {method.name!r} leaves out {listed(names)}, which the assessment alone judges; use method='qp'"
         warnings.warn(said, stacklevel=level + 1)
     return method
+
+
+def _left_out(method: Any, problem: Problem) -> Sequence[str]:
+    """What a method does not look at of a problem that it takes; nothing of one that it refuses by an error."""
+    if not hasattr(method, "leaves_out"):
+        return ()
+    try:
+        problem.check_fresh()
+        names: Sequence[str] = method.leaves_out(problem)
+        return names if names and method.accepts(problem) is None else ()
+    except WholebodyError:
+        return ()
 
 
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:
@@ -109,7 +120,7 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
     """
     check_problem(problem, "solve: problem")
     progress = function(progress, "progress")
-    solution = warn_of_left_out(as_method(method), problem, 2).solve(problem, progress)
+    solution = warn_of_left_out(as_method(method), 2, problem).solve(problem, progress)
     _warn_if_nothing_holds(problem, solution)
     return solution
 

@@ -125,7 +125,7 @@ def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array
 
 
 def crouched(problem: Problem, state: State, start: Array) -> Array | None:
-    """The start (nq,) with everybody who keeps balance on two feet in the posture "squatting"; None with nobody."""
+    """The start (nq,) with everybody who balances in the posture "squatting"; None with nobody."""
     figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
     upright = [term for term in problem.constraints if is_a(term, UPRIGHT) and getattr(term, "balance", True)]
     for term in upright:

@@ -147,11 +147,12 @@ def solutions(
             complete = begun == len(branches) if every else all_found(len(known.answers), descents, 40)
             stopped = told is not None and told(begun, total) is True
             if stopped or complete or (unchanged == UNCHANGED and not every):
-                last = f"the last {unchanged} starts changed none of the least {most}"
+                last = f"the last {unchanged} starts " + ("changed none of these" if len(least) else "led to none")
                 ended = "progress ended it" if stopped else "other starts lead to no others" if complete else last
                 break
     found = known.answers
-    complete = complete and _stand_alone(problem, [answer.q for answer in found])
+    if complete and not _stand_alone(problem, [answer.q for answer in found]):
+        complete, ended = False, "neighbours of these meet the goals too"
     return Solutions(tuple(found[:most]), len(found), descents, begun, complete, ended)
 
 

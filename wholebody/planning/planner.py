@@ -110,7 +110,7 @@ def plan(
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
         time_limit: seconds of the processor that all but compiling may take, the judgement too; at least 0.1. Free
-            roots are sampled within a metre of the line between the ends.
+            roots and planar joints are sampled within a metre of the line between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not

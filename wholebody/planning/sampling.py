@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 
@@ -24,7 +26,8 @@ class Sampler:
     def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
         self._figure, self._rng, self._held = problem.scene.figure, rng, holds(problem)
         self._frozen = still_dofs(problem)
-        self._roots = [self._figure.model.joints[root] for root in self._figure.roots.values()]
+        self._roots = [joint for joint in self._figure.model.joints if joint.nq == 7]
+        self._loose = [joint for joint in self._figure.model.joints if (joint.nq, joint.nv) == (4, 3)]  # carts, balls
         self._drawn: list[Array] = []
         model = self._figure.model
         hinges = (
@@ -51,7 +54,7 @@ class Sampler:
         return self._drawn.pop()
 
     def near(self, q: Array, spread: float) -> Array:
-        """A posture (nq,) whose joints are a fraction of the way from q to a random one; a free root within `ROOM`."""
+        """A posture (nq,) whose joints are a fraction of the way from q to a random one; roots within `ROOM`."""
         # where nothing is held, a root is a random share of that away, and turns in half of the postures
         model, rng = self._figure.model, self._rng
         away = spread * np.asarray(pin.difference(model, q, self.turned(self.anywhere(), q)))
@@ -64,5 +67,21 @@ class Sampler:
             moved = far * rng.uniform(-ROOM, ROOM, 3)
             there = pin.SE3(turn @ here.rotation, here.translation + moved)
             away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
+        for joint in self._loose:
+            away[joint.idx_v : joint.idx_v + 3] = self._loosely(q, joint, spread)
         away[self._frozen] = 0.0
         return np.asarray(pin.integrate(model, q, away))
+
+    def _loosely(self, q: Array, joint: Any, spread: float) -> Array:
+        """A random motion (3,) of a planar joint, which is a root on a floor, or of a ball joint."""
+        model, rng, there, at = self._figure.model, self._rng, q.copy(), joint.idx_q
+        if joint.shortname() == "JointModelPlanar":
+            turn = rng.uniform(-np.pi, np.pi) * (not self._held and rng.uniform() < 0.5)
+            angle = turn + np.arctan2(q[at + 3], q[at + 2])
+            far, spread = (spread if self._held else 10.0 ** rng.uniform(-1.0, 0.0)), 1.0
+            there[at : at + 2] += far * rng.uniform(-ROOM, ROOM, 2)
+            there[at + 2 : at + 4] = np.cos(angle), np.sin(angle)
+        else:
+            turned = rng.normal(size=4)
+            there[at : at + 4] = turned / np.linalg.norm(turned)
+        return np.asarray(spread * pin.difference(model, q, there)[joint.idx_v : joint.idx_v + 3])

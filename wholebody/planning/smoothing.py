@@ -123,6 +123,10 @@ def places(model: pin.Model, path: Sequence[Array] | Array) -> Array:
         own = found[:, joint.idx_v : joint.idx_v + joint.nv]
         if (joint.nq, joint.nv) == (2, 1):
             own[:] = np.unwrap(own, axis=0)
+        elif joint.shortname() == "JointModelPlanar":  # as a free body
+            flat = np.zeros((len(own), 6))
+            flat[:, [0, 1, 5]] = own
+            own[:] = _unwrapped(flat)[:, [0, 1, 5]]
         elif (joint.nq, joint.nv) in ((7, 6), (4, 3)):  # free bodies and balls
             own[:] = _unwrapped(own)
     return found

@@ -126,8 +126,7 @@ def solve_many(
     what = "solve_many"
     named = _named(problems, what)
     running = Running.checked(what, method, seconds, jobs=jobs, cluster=cluster, progress=progress)
-    for _, problem in named[:1]:
-        warn_of_left_out(running.method, problem, 2)
+    warn_of_left_out(running.method, 2, *(problem for _, problem in named))
     warm_start = checks.flag(warm_start, f"{what}: warm_start")
     store = None if folder is None else KeptRecords(checks.path(folder, f"{what}: folder"))
     cases = []

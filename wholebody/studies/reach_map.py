@@ -175,7 +175,7 @@ def reach_map(
         whole: Method = QP(measures=False)
         quick: Method = QP(measures=False, restarts=0, budget=0, iterations=30)  # from a neighbour's posture
     else:
-        whole = quick = warn_of_left_out(as_method(method), problem, 2)
+        whole = quick = warn_of_left_out(as_method(method), 2, problem)
     checks.keywords(running, JobOptions, what)
     asked = Asked(problem, frame, point, whole, quick)
     search = _Search(asked, grid, Jobs.checked(what, **running))

@@ -199,7 +199,7 @@ class SolePolygon(NamedTuple):
         return np.asarray(np.einsum("nj,njk->nk", self.points, placed[:, :3]) + placed[:, 3])
 
     def rows(self, state: State) -> tuple[Array, Array]:
-        """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
+        """Distances (m,) inside the edges and their derivative (m, nv); 1 and zero for no corner."""
         return self.inside(state, state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass))
 
     def height(self, state: State) -> tuple[float, Array]:

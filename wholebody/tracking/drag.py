@@ -92,7 +92,7 @@ class ProblemDrag:
 
     def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float, budget: float) -> None:
         self.problem, self.dt = copied(problem), time_step(dt, "dt")
-        self.method = warn_of_left_out(method_for_motions(method), self.problem, 3)
+        self.method = warn_of_left_out(method_for_motions(method), 3, self.problem)
         self.tracker = self.method.tracker(self.problem, self.dt)
         self.workspace = self.tracker.workspace
         self._alone = OneAtATime("drag")

@@ -69,7 +69,7 @@ class DragJudgement:
         error: (n,) remaining error of the moving goal in each frame, metres, or radians if that is more.
         depth: (n + 2,) deepest overlap of any pair, metres; 0 if there is none.
         between: (n + 1,) a bound on how much deeper any pair gets between two postures than at the deeper of the two,
-            metres, one of `motion_assessment.DEPTHS`; inf if it is more than the last of them.
+            metres, one of `assessment.motion.DEPTHS`; inf if it is more than the last of them.
         constraint_violation: (n + 2,) largest violation of a constraint, metres or radians.
         limit_violation: largest violation of a joint limit at any posture, radians.
         jerk: (n - 1,) root of the mean square of the third difference of the joint angles over time, rad/s^3.

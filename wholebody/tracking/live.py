@@ -166,7 +166,7 @@ class LiveDrag:
             raise InputError(f"an assembly is dragged by Newton steps, not by {shown(method)}; leave method out")
         self.method: Method = method_for_motions(method)
         if isinstance(self.problem, Problem):
-            warn_of_left_out(self.method, self.problem, 2)
+            warn_of_left_out(self.method, 2, self.problem)
         self.chosen = str(getattr(method, "name", method))
         self.methods.setdefault(self.chosen, method)
         self._rehearse()

@@ -78,7 +78,7 @@ def follow_path(
     if not isinstance(term, Point):
         raise InputError(f"follow_path moves a Point, and goals[{goal}] is a {type(term).__name__}; use Drag")
     own, q, found = copied(problem), problem.scene.figure.clamp(problem.start), list[Solution]()
-    tracker = warn_of_left_out(method_for_motions(method), own, 2).tracker(own, FRAME)
+    tracker = warn_of_left_out(method_for_motions(method), 2, own).tracker(own, FRAME)
     for place in places:
         retarget(own, goal, place)
         found.append(warm_started(own, tracker, q) if found else tracker.solve(q))

@@ -38,7 +38,7 @@ class UrdfFile(NamedTuple):
     shapes: tuple[LinkShape, ...]  # collision shapes in the order of the file
     colors: dict[str, Color]  # link to red, green, blue, alpha of the first of its visuals that has a colour
     visuals: tuple[LinkVisual, ...]  # what the file wants drawn, without what is wholly transparent or cannot be read
-    extension: Element | None  # the element `EXTENSION`, or None
+    extension: Element | None  # the element "wholebody", or None
     notes: tuple[str, ...]  # one sentence for each missing part that was filled in
 
 

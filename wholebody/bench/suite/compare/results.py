@@ -29,7 +29,7 @@ process was ended because it took too long."""
 class Record:
     """One solve. Errors are infinite where there is no answer.
 
-    `budget`: 0 iterations are the method's own, -1 is `FEASIBILITY_ONLY`. `status`: what the method claims; `said`: its
+    `budget`: 0 iterations are the method's own, -1 is until all is met. `status`: what the method claims; `said`: its
     message, its refusal or the exception. `seconds`, `cpu_seconds`: of the call without the judgement, of a frame
     (median) where goals move; `tool_seconds`: within calls of the tool behind an adapter; `setup_seconds`: to build a
     model of its own. `programs`: what closed its quadratic programs. Errors are as judged [m, rad]: of goals 95 % of
