@@ -127,7 +127,7 @@ def solutions(
     (branches, every), complete = closed_form_postures(problem, starts), False
     every = every and len(branches) > 0 and _stand_alone(problem, branches)
     total = len(branches) if every else starts
-    ended = f"{total} starts were made"
+    ended = f"{total} start{'s were' if total != 1 else ' was'} made"
     with within_budget(LONGEST if time_limit is None else np.inf):
         for start in islice(chain(branches, () if every else _starts(problem, starts, seed)), total):
             if begun and (BUDGET.over or ends <= time.perf_counter()):  # the first begins however long it took so far

@@ -92,10 +92,11 @@ class QP(Settings, Descends):
         begin, before = ((), ()) if met is None else (() if met.complete else met.begins, met.trace)
         known = () if met is None else (met.blocked, met.near, _measure(problem, workspace, met.through))
         best = search.run(begin, *known)
+        starts = f"{search.tried} start{'s' * (search.tried != 1)}"
         return Ending(
             best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
             contradictions=search.contradictions, programs=search.solver.counted(),
-            unreached="seems out of reach" if search.out_of_reach else f"not found from {search.tried} starts",
+            unreached="seems out of reach" if search.out_of_reach else f"not found from {starts}",
         )  # fmt: skip
 
     def _complete(self, problem: Problem, met: Met | None) -> Ending | None:
