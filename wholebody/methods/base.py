@@ -182,7 +182,7 @@ def unseen(problem: Problem, takes: Callable[[object], bool], *, contacts: bool 
     return (*([CONTACTS] if contacts and len(problem.clearances) else []), *defaults)
 
 
-def listed(names: Sequence[str]) -> str:
+def enumeration(names: Sequence[str]) -> str:
     """Names as words: "contacts, Balance (by default) and ReachCones (by default)"."""
     *before, last = names
     return f"{', '.join(before)} and {last}" if before else last

@@ -16,7 +16,7 @@ import numpy as np
 from wholebody.base.checks import function, shown
 from wholebody.base.errors import InputError, UnknownNameError, WholebodyError, one_line
 from wholebody.methods import METHODS
-from wholebody.methods.base import Method, check_problem, listed
+from wholebody.methods.base import Method, check_problem, enumeration
 from wholebody.methods.control import Progress
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -77,8 +77,8 @@ def method_for_motions(given: object) -> Method:
 def warn_of_left_out(method: Method, level: int, *problems: Problem) -> Method:
     """Say before anything is computed what a method does not look at; `level` as in `warnings.warn`, of the caller."""
     if names := [*dict.fromkeys(name for problem in problems for name in _left_out(method, problem))]:
-        said = f"method {method.name!r} leaves out {listed(names)}, which the assessment alone judges; use method='qp'"
-        warnings.warn(said, stacklevel=level + 1)
+        said = f"method {method.name!r} leaves out {enumeration(names)}, which the assessment alone judges"
+        warnings.warn(f"{said}; use method='qp'", stacklevel=level + 1)
     return method
 
 

@@ -18,6 +18,7 @@ from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
+from wholebody.methods.newton.measures import MINIMISED
 from wholebody.methods.newton.multistart import NewtonMultistart, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
@@ -70,7 +71,7 @@ class Newton(Settings, Descends):
 
     def _unseen(self, problem: Problem) -> tuple[str, ...]:
         """See `Descends._unseen`: stated measures that depend on what is no revolute joint."""
-        if not problem.measures_given:
+        if not problem.measures_given or all(isinstance(term, MINIMISED) for term in problem.measures):
             return ()
         with problem.borrow() as workspace:
             return tuple(FigureSystem(problem, workspace, self.algebra).objective.reported)
