@@ -17,9 +17,11 @@ from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import allowed
 from wholebody.tasks.checks import is_a
+from wholebody.tasks.contact_parts import Over
 from wholebody.tasks.defaults import UPRIGHT
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.inputs import body_of
+from wholebody.tasks.sit import Sit
 
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
@@ -130,16 +132,51 @@ def crouched(problem: Problem, state: State, start: Array) -> Array | None:
     upright = [term for term in problem.constraints if is_a(term, UPRIGHT) and getattr(term, "balance", True)]
     for term in upright:
         body = body_of(problem.scene, term.feet)
-        name, root = f"{body}squatting", figure.roots.get(f"{body}root")
-        if name not in figure.postures or root is None or getattr(term, "knees", None):
+        if getattr(term, "knees", None) or (root := _root_at(problem, start, body)) is None:
             continue
-        low, idx = figure.posture(name), int(figure.model.joints[root].idx_q)
-        begun, usual, placed = (pin.XYZQUATToSE3(q[idx : idx + 7]) for q in (start, figure.neutral, low))
-        low[idx : idx + 7] = pin.SE3ToXYZQUAT(begun * usual.inverse() * placed)
-        own = [figure.model.joints[joint] for joint in figure.bodies[str(body)]]
-        dofs = np.concatenate([np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in own])
-        move[dofs] = pin.difference(figure.model, start, low)[dofs]
+        usual, low = _root_at(problem, figure.neutral, body), _root_at(problem, start, body, f"{body}squatting")
+        if usual is not None and low is not None:
+            move += _to_posture(problem, start, body, "squatting", root * usual.inverse() * low)
     return _moved(problem, state, start, move) if move.any() else None
+
+
+def seated(problem: Problem, state: State, start: Array) -> Iterator[Array]:
+    """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn."""
+    figure = problem.scene.figure
+    for term in (*problem.goals, *problem.constraints):
+        over = [part for part in term.parts if isinstance(part, Over)] if isinstance(term, Sit) else []
+        body = body_of(problem.scene, [term.frame]) if over else None
+        if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:
+            continue
+        place, face, high = over[0].place, over[0].face, over[0].high[2]
+        middle, axes = face.at(state.update(start))
+        pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
+        at = middle + high * axes[2]
+        for yaw in np.arange(8) * 0.25 * np.pi:
+            turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3))
+            root = pin.SE3(np.eye(3), at) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
+            yield _moved(problem, state, start, _to_posture(problem, start, body, "sitting", root))
+
+
+def _root_at(problem: Problem, q: Array, body: str | None, posture: str = "") -> pin.SE3 | None:
+    """Where the free root of a body is at q (nq,) or in a posture by name; None without such a posture or root."""
+    figure = problem.scene.figure
+    root = figure.roots.get(f"{body}root")
+    if root is None or (posture and posture not in figure.postures):
+        return None
+    idx = int(figure.model.joints[root].idx_q)
+    return pin.XYZQUATToSE3((figure.posture(posture) if posture else q)[idx : idx + 7])
+
+
+def _to_posture(problem: Problem, start: Array, body: str | None, name: str, root: pin.SE3) -> Array:
+    """The move (nv,) of one body from the start (nq,) to a posture by name, its root at a placement."""
+    figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
+    q, idx = figure.posture(f"{body}{name}"), int(figure.model.joints[figure.roots[f"{body}root"]].idx_q)
+    q[idx : idx + 7] = pin.SE3ToXYZQUAT(root)
+    own = [figure.model.joints[joint] for joint in figure.bodies[str(body)]]
+    dofs = np.concatenate([np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in own])
+    move[dofs] = pin.difference(figure.model, start, q)[dofs]
+    return move
 
 
 def throughout(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:

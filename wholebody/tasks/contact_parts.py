@@ -14,9 +14,10 @@ from wholebody.base.arrays import Array, Mask, cross, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes, filled
+from wholebody.tasks.faces import Face
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.kinks import MOST_FACES, bends, crossed_edges, faces_met
-from wholebody.tasks.surfaces import Face, Nearest, Surface, foot, nearest
+from wholebody.tasks.surfaces import Nearest, Surface, foot, nearest
 
 _T = TypeVar("_T")
 

@@ -18,8 +18,9 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
+from wholebody.tasks.faces import face
 from wholebody.tasks.grips import Crossing, Looking, Opposing, bar_of, rim_of, rounded
-from wholebody.tasks.surfaces import Surface, carried_by, face, joined, segments_beyond, surface
+from wholebody.tasks.surfaces import Surface, carried_by, joined, segments_beyond, surface
 from wholebody.tasks.touch import check_apart
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")

@@ -22,8 +22,9 @@ from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
 from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
+from wholebody.tasks.faces import Face
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Nearest, Surface, between_transforms, nearest, outermost
+from wholebody.tasks.surfaces import Nearest, Surface, between_transforms, nearest, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of

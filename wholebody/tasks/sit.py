@@ -18,9 +18,8 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Made, Near, Over, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, face, joined, once_by, outermost, segments_on, surface
-
-UP = np.array((0.0, 0.0, 1.0))
+from wholebody.tasks.faces import UP, Face, back_above, bearing_face
+from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_on, surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +35,15 @@ class Sit(ContactTerm):
     or before the knees is then what dimensions of sitting people say; who may slouch or spread fits elsewhere too.
 
     Attributes:
-        on: the seat: a thing, or a piece of one such as "chair:2".
-        back: what the back is at; None for a stool.
+        on: the seat: a thing, whose largest flat face that looks up is sat on, or a piece of one such as "chair:2".
+        back: what the back is at, the same thing where seat and backrest are one mesh; None for a stool.
         pelvis: the segment that sits.
         trunk: the last of the segments above the pelvis that may touch the back.
         erect: whether hips, spine and neck are held as people are measured.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
+        InputError: a value of the wrong kind, shape or range; in a problem, a thing that is to be its own back has none.
         UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
@@ -73,29 +72,26 @@ class Sit(ContactTerm):
 
     def _between(self, scene: Scene, where: str, state: State, rest: State) -> Made:
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
-        seat = face(scene, self.on, UP, state, where)
+        seat = bearing_face(scene, self.on, UP, state, where)
         thighs = inputs.once(scene, ("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
         bottom = joined(scene, self.pelvis, [self.pelvis, *thighs])
         if not bottom.pieces:
             raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")
-        thing = surface(scene, self.on, where)
         edge = np.maximum(seat.half - np.minimum(0.08, 0.5 * seat.half), 0.0)  # m: half a narrow seat
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place, rest) + 0.01
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
         root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
         left = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 1]
-        parts: list[Part] = [Gap(bottom, thing, seat), over]
+        parts: list[Part] = [Gap(bottom, seat.surface, seat), over]
         behind = [self.pelvis] if self.erect else []  # whoever sits erect has the buttocks at the back, too
-        touches = owner_pairs(bottom.owners, thing.owners)
+        touches = owner_pairs(bottom.owners, seat.surface.owners)
         if self.back is None:
             parts.append(Level(place, left, seat))
         else:
-            at_back = surface(scene, self.back, where)
             between = (joint for joint in scene.model.supports[trunk.joint] if joint > place.joint)
             upper = joined(scene, self.trunk, [*behind, *segments_on(scene, between)])
-            middle = seat.at(state)[0]
-            side = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
+            side, at_back = self._at_back(scene, self.back, seat, state, where)
             to_left = _level(cross(UP, side.at(state)[1][2]), where)
             lower = joined(scene, self.pelvis, [self.pelvis])
             # m: how far the pelvis may be from the back; more, and the figure slouches
@@ -106,6 +102,13 @@ class Sit(ContactTerm):
             ahead = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 0]
             parts += [Level(place, ahead, seat), self._measured(scene, place, where)]
         return tuple(parts), touches
+
+    def _at_back(self, scene: Scene, back: str, seat: Face, state: State, where: str) -> tuple[Face, Surface]:
+        """The face of the back that looks to the seat, and the surface of the back."""
+        if back == self.on:
+            return back_above(scene, back, seat, state, where)
+        whole, middle = surface(scene, back, where), seat.at(state)[0]
+        return bearing_face(scene, back, _level(middle - _middle(whole, state, middle), where), state, where), whole
 
     def _measured(self, scene: Scene, place: inputs.Place, where: str) -> AtAngles:
         """Hips, spine and neck as in the posture of people who are measured: sitting, with parallel thighs."""
@@ -169,7 +172,7 @@ def _depth(scene: Scene, name: str, place: inputs.Place, state: State) -> float:
     return float(state.frame(place.frame).translation[2] - min(lows))
 
 
-def _middle(thing: Surface, state: State, other: Array, where: str) -> Array:
+def _middle(thing: Surface, state: State, other: Array) -> Array:
     """Mean (3,) of the origins of a thing's pieces; for a half-space the nearest point of its plane."""
     shape = thing.shapes[0]
     if isinstance(shape, coal.Halfspace):

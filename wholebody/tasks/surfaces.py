@@ -1,4 +1,4 @@
-"""Surfaces of segments and things: the distance between two of them, and the flat face of a thing towards a direction.
+"""Surfaces of segments and things, and the distance between two of them.
 
 A surface is a union of convex pieces, or one point. Its pieces are read from the scene's geometry model whenever they
 are asked for, so a thing that is moved after a term was resolved is found where it is.
@@ -21,7 +21,6 @@ from wholebody.figures.state import State
 from wholebody.geometry.flesh import Flesh, flesh_of
 from wholebody.geometry.pieces import SweptPoints, swept_points
 from wholebody.scene.scene import Scene
-from wholebody.tasks.axis import across
 from wholebody.tasks.inputs import once
 
 _T = TypeVar("_T")
@@ -119,7 +118,7 @@ def surface(scene: Scene, name: str, where: str) -> Surface:
     if not owned:
         owned = [index for index, piece in enumerate(scene.geometry.geometryObjects) if piece.name == name]
     if owned:
-        return _of_pieces(scene, name, owned)
+        return of_pieces(scene, name, owned)
     try:
         number = scene.figure.frame_id(name)
     except UnknownNameError as error:
@@ -140,7 +139,7 @@ def surface(scene: Scene, name: str, where: str) -> Surface:
 
 def joined(scene: Scene, name: str, owners: Collection[str]) -> Surface:
     """The surface of several segments or things that count as one."""
-    return _of_pieces(scene, name, [index for index, owner in enumerate(scene.piece_owner) if owner in owners])
+    return of_pieces(scene, name, [index for index, owner in enumerate(scene.piece_owner) if owner in owners])
 
 
 def carried_by(scene: Scene, name: str, joint: int) -> Surface:
@@ -148,7 +147,7 @@ def carried_by(scene: Scene, name: str, joint: int) -> Surface:
     segments = set(scene.figure.segments)
     pieces = scene.geometry.geometryObjects
     owned = [k for k, owner in enumerate(scene.piece_owner) if owner in segments and pieces[k].parentJoint == joint]
-    return _of_pieces(scene, name, owned)
+    return of_pieces(scene, name, owned)
 
 
 def once_by(
@@ -174,7 +173,8 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
     return _made(name, (), made, range(made.ngeoms))
 
 
-def _of_pieces(scene: Scene, name: str, indices: Sequence[int]) -> Surface:
+def of_pieces(scene: Scene, name: str, indices: Sequence[int]) -> Surface:
+    """The surface of some pieces of the scene's geometry model."""
     owners = tuple(dict.fromkeys(scene.piece_owner[k] for k in indices))
 
     def made() -> Surface:
@@ -250,53 +250,6 @@ def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
     place = pin.SE3(np.eye(3), point)
     found = between_pieces(coal.Sphere(POINT), place, surface.shapes[number], surface.placed(number, state))
     return np.array(found.getNearestPoint2())
-
-
-class Face(NamedTuple):
-    """A flat face of a thing, in the axes of one of its pieces, so that it goes where the thing goes."""
-
-    surface: Surface  # of the thing
-    center: Array  # (3,) middle of the face [m]
-    axes: Array  # (3, 3) rows: two directions in the face, and its outward normal
-    half: Array  # (2,) half its size along the two directions; inf for a half-space [m]
-
-    @property
-    def joint(self) -> int:
-        """Joint that carries the thing; 0 is the world."""
-        return self.surface.joints[0]
-
-    def at(self, state: State) -> tuple[Array, Array]:
-        """Middle (3,) and axes (3, 3) in the world."""
-        place = self.surface.placed(0, state)
-        return place.act(self.center), self.axes @ place.rotation.T
-
-
-def face(scene: Scene, name: str, direction: Array, state: State, where: str) -> Face:
-    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest."""
-    found = surface(scene, name, where)
-    if found.fixed is not None:
-        raise InputError(f"{where}: {shown(name)} is a frame and has no face; name a thing or a segment")
-    place = found.placed(0, state)
-    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Halfspace):
-        normal = np.array(found.shapes[0].n)
-        return Face(found, normal * float(found.shapes[0].d), across(normal), np.full(2, np.inf))
-    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Box):
-        half = np.array(found.shapes[0].halfSide)
-        along = place.rotation.T @ direction
-        axis = int(np.argmax(np.abs(along)))
-        normal = np.eye(3)[axis] * (1.0 if along[axis] >= 0.0 else -1.0)
-        others = [k for k in range(3) if k != axis]
-        return Face(found, normal * half[axis], np.array([*np.eye(3)[others], normal]), half[others])
-    shapes = enumerate(found.shapes)
-    everything = np.vstack([outermost(shape, found.placed(number, state), direction) for number, shape in shapes])
-    height = everything @ direction
-    # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
-    top = everything[height >= height.max() - 2e-3]
-    axes = across(direction)
-    flat = top @ axes[:2].T
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    center = axes[:2].T @ (0.5 * (low + high)) + direction * height.max()
-    return Face(found, place.actInv(center), axes @ place.rotation, 0.5 * (high - low))
 
 
 def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoints | None = None) -> Array:

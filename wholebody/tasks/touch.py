@@ -18,7 +18,8 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Made, Meeting, OwnSurface, Part, owner_pairs
-from wholebody.tasks.surfaces import Face, Surface, carried_by, face, nearest, surface
+from wholebody.tasks.faces import Face, face
+from wholebody.tasks.surfaces import Surface, carried_by, nearest, surface
 
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 WITHIN_FACE = 1e-3  # m: and one on a face is within it if it is this far from all others

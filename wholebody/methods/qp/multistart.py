@@ -21,7 +21,7 @@ from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
-from wholebody.methods.starts import Attempt, Minima, alike, crouched, hooked_hands, restarts, throughout
+from wholebody.methods.starts import Attempt, Minima, alike, crouched, hooked_hands, restarts, seated, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.distance import Effort
@@ -69,6 +69,8 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
+        there = self._nearer(seated(self.problem, self.lineariser.state, self._start))
+        yield Attempt(there, self.directly, "from the seat")
         yield Attempt(begin, self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
@@ -77,19 +79,20 @@ class QPMultistart(Search):
             return
         self._least = least
         if not least:
-            yield Attempt(self._nearer_squat(), self.directly, "from a squat")
+            low = crouched(self.problem, self.lineariser.state, self._start)
+            yield Attempt(self._nearer([] if low is None else [low]), self.directly, "from a squat")
         if self.settings.measures and not self._proven():
             yield Attempt([self._start], self._without_measures, "")
         elif not self._proven():
             yield from self._attempts_for_feasibility()
 
-    def _nearer_squat(self) -> Iterator[Array]:
-        """The squat of a figure that balances, if it is nearer to the goals than the start by a third."""
-        low = crouched(self.problem, self.lineariser.state, self._start)
-        for q in self.lineariser.defined([] if low is None else [low]):
-            missed = [float(np.linalg.norm(self.lineariser.at(each, 0.0).goal_error)) for each in (q, self._start)]
-            if missed[0] < 2 / 3 * missed[1]:  # else few goals are met from there that are not from the start
-                yield q
+    def _nearer(self, postures: Iterable[Array]) -> Iterator[Array]:
+        """Of postures (nq,) the nearest to goals and holds, if it is nearer than the start by a third."""
+        known = [self._start, *self.lineariser.defined(postures)]
+        found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
+        missed = [each.left + each.hold for each in found]
+        if min(missed) < 2 / 3 * missed[0]:  # else few goals are met from there that are not from the start
+            yield known[int(np.argmin(missed))]
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
