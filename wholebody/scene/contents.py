@@ -14,7 +14,8 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.loading import join, welded
+from wholebody.figures.joining import welded
+from wholebody.figures.loading import join
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
