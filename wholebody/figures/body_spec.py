@@ -20,6 +20,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import Person
 from wholebody.geometry.flesh import mark_flesh
 from wholebody.geometry.hull import hull_piece
+from wholebody.geometry.pieces import CORNERS
 
 
 class Solid(NamedTuple):
@@ -269,5 +270,4 @@ def tapered(radius_start: float, radius_end: float, length: float, what: str) ->
 
 def box(size: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a box about the origin: eight vertices, twelve triangles."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return _convex(corners * np.array(size), what)
+    return _convex(0.5 * CORNERS * np.array(size), what)
