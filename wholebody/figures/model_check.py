@@ -57,13 +57,6 @@ def joint_of(model: pin.Model, freedom: int) -> int:
     )
 
 
-def along_z(axis: Array) -> Array:
-    """A rotation (3, 3) whose third column is a unit direction."""
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
-    x /= np.linalg.norm(x)
-    return np.column_stack((x, np.cross(axis, x), axis))
-
-
 FAR_OUT = 1.0  # radians beyond a limit from which a value was probably meant in degrees
 
 

@@ -16,8 +16,8 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.figures.description import ROOT_JOINT, JointCone, Law, follows, led
 from wholebody.figures.mjcf.compiled import BALL, FREE, HINGE, SLIDE, Compiled, placement
-from wholebody.figures.model_check import along_z
 from wholebody.figures.motion_ranges import ReachCone
+from wholebody.geometry.placement import along_z
 
 
 class RobotModel(NamedTuple):

@@ -22,13 +22,13 @@ from wholebody.base.errors import FileFormatError, InputError
 from wholebody.figures.description import Law, led
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
-from wholebody.figures.model_check import along_z
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
 from wholebody.figures.urdf.file import UrdfFile, read_urdf
 from wholebody.figures.urdf.joints import UrdfJoint
 from wholebody.figures.urdf.srdf import read_srdf
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
+from wholebody.geometry.placement import along_z
 
 
 def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
