@@ -16,7 +16,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import Person
 from wholebody.geometry.flesh import mark_flesh
 from wholebody.geometry.hull import hull_piece
@@ -107,38 +106,32 @@ def urdf_text(spec: BodySpec, extension: str = "") -> str:
 def _with_virtual_masses(spec: BodySpec) -> list[Link]:
     """The links, those without mass between two joints of a ball joint with `VIRTUAL_MASS` of the next one."""
     outwards = {joint.parent: joint.child for joint in spec.joints}
-    moving = {joint.child for joint in spec.joints}
     masses = {link.name: link.mass for link in spec.links}
     taken = dict.fromkeys(masses, 0.0)
     for link in spec.links:
         heavy = link.name
-        while not masses[heavy] and heavy in outwards:
+        while not masses[heavy]:
             heavy = outwards[heavy]
-        if not link.mass and link.name in moving and masses[heavy]:
-            taken[heavy] += VIRTUAL_MASS
-    made = []
-    for link in spec.links:
-        if not link.mass and link.name in moving:
-            # Its moment of inertia about any axis, kg m^2.
-            made.append(with_values(link, mass=VIRTUAL_MASS, inertia=(1e-9,) * 3))
-        else:
-            made.append(with_values(link, mass=link.mass - taken[link.name]) if link.mass else link)
-    return made
+        taken[heavy] += 0.0 if link.mass else VIRTUAL_MASS
+    return [
+        # a moment of inertia about any axis, kg m^2
+        with_values(link, mass=link.mass - taken[link.name])
+        if link.mass
+        else with_values(link, mass=VIRTUAL_MASS, inertia=(1e-9,) * 3)
+        for link in spec.links
+    ]
 
 
 def _link(link: Link, solids: Sequence[Solid]) -> list[str]:
-    if not link.mass and not solids:
-        return [f'  <link name="{link.name}"/>']
-    lines = [f'  <link name="{link.name}">']
-    if link.mass:
-        ixx, iyy, izz = link.inertia
-        lines += [
-            "    <inertial>",
-            f'      <origin xyz="{digits(link.center)}"/>',
-            f'      <mass value="{_digit(link.mass)}"/>',
-            f'      <inertia ixx="{_digit(ixx)}" ixy="0" ixz="0" iyy="{_digit(iyy)}" iyz="0" izz="{_digit(izz)}"/>',
-            "    </inertial>",
-        ]
+    ixx, iyy, izz = link.inertia
+    lines = [
+        f'  <link name="{link.name}">',
+        "    <inertial>",
+        f'      <origin xyz="{digits(link.center)}"/>',
+        f'      <mass value="{_digit(link.mass)}"/>',
+        f'      <inertia ixx="{_digit(ixx)}" ixy="0" ixz="0" iyy="{_digit(iyy)}" iyz="0" izz="{_digit(izz)}"/>',
+        "    </inertial>",
+    ]
     for tag in ("visual", "collision"):
         for solid in solids:
             lines += [
@@ -180,15 +173,9 @@ def _geometry(solid: Solid) -> str:
     if solid.mesh is not None:
         file, scale = solid.mesh
         return f'<mesh filename="{file}" scale="{digits(scale)}"/>'
-    if kind == "Sphere":
-        return f'<sphere radius="{_digit(shape.radius)}"/>'
     if kind == "Capsule":
         return f'<cylinder radius="{_digit(shape.radius)}" length="{_digit(2.0 * shape.halfLength)}"/>'
-    if kind == "Box":
-        return f'<box size="{digits(2.0 * np.array(shape.halfSide))}"/>'
-    raise InputError(
-        f"piece {solid.name!r} is a {kind} without a mesh file; URDF knows spheres, cylinders, boxes, meshes"
-    )
+    return f'<box size="{digits(2.0 * np.array(shape.halfSide))}"/>'
 
 
 def _origin(placement: pin.SE3) -> str:
