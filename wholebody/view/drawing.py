@@ -72,9 +72,9 @@ def _shape(geometry: Any, name: str) -> tuple[Three, tuple[float, float, float],
         return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, one, None, True
     if kind == "Capsule":
         return _triangles(*capsule_surface(float(geometry.radius), float(geometry.halfLength))), one, None, False
-    if kind in ("Cylinder", "Cone"):
-        top = float(geometry.radius) if kind == "Cylinder" else 0.0
-        size = {"radiusTop": top, "radiusBottom": float(geometry.radius), "height": 2 * float(geometry.halfLength)}
+    if kind == "Cylinder":
+        radius, height = float(geometry.radius), 2.0 * float(geometry.halfLength)
+        size = {"radiusTop": radius, "radiusBottom": radius, "height": height}
         return {"type": "CylinderGeometry", **size, "radialSegments": _AROUND}, one, _ALONG_Z, False
     if kind == "Halfspace":
         width, height, depth = LOOK.plate
