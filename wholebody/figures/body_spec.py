@@ -19,6 +19,7 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.figures.anthropometry import Person
 from wholebody.geometry.flesh import mark_flesh
 from wholebody.geometry.hull import hull_piece
+from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import CORNERS
 
 
@@ -202,8 +203,7 @@ def model_of(spec: BodySpec) -> pin.Model:
 
 def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[str, str], ...]) -> pin.GeometryModel:
     """Return Pinocchio's geometry: the pieces on their segments, and the pairs that can touch."""
-    geometry = pin.GeometryModel()
-    index = {}
+    pieces = []
     for solid in solids:
         frame_id = model.getFrameId(solid.segment)
         frame = model.frames[frame_id]
@@ -211,11 +211,13 @@ def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[
             solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
         )
         piece.meshColor[:] = (0.85, 0.68, 0.55, 1.0)  # red, green, blue, opacity
-        index[solid.name] = geometry.addGeometryObject(piece)
+        pieces.append(piece)
+    index = {solid.name: number for number, solid in enumerate(solids)}
+    numbers = [sorted((index[a], index[b])) for a, b in pairs]
+    geometry = geometry_model(pieces, np.array(numbers, dtype=np.intp).reshape(-1, 2))
+    for number, solid in enumerate(solids):
         if solid.flesh:
-            mark_flesh(model, geometry, index[solid.name])
-    for a, b in pairs:
-        geometry.addCollisionPair(pin.CollisionPair(*sorted((index[a], index[b]))))
+            mark_flesh(model, geometry, number)
     return geometry
 
 
