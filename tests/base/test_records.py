@@ -15,6 +15,8 @@ import pytest
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.records import RecordFile, source_digest
 
+SETTINGS = {"seed": 0, "sets": ("a",), "levels": {"x": [[0.1, None], [0.01, 3]]}, "most": nan}
+
 
 @dataclass(frozen=True)
 class Solve:
@@ -29,8 +31,8 @@ def made(plain: dict[str, Any]) -> Solve:
     return Solve(**plain)
 
 
-def opened(folder: Path) -> RecordFile[Solve]:
-    return RecordFile(folder / "run" / "solves.jsonl", "solves of a test", made)
+def opened(folder: Path, settings: dict[str, Any] = SETTINGS) -> RecordFile[Solve]:
+    return RecordFile(folder / "run" / "solves.jsonl", "solves of a test", made, settings)
 
 
 def test_what_was_written_comes_back_to_the_last_bit(tmp_path: Path) -> None:
@@ -99,6 +101,25 @@ def test_a_file_that_was_taken_away_is_begun_anew(tmp_path: Path) -> None:
     assert list(opened(tmp_path).kept) == ["second"]
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"seed": 5}, "holds a run with seed = 0, and 5 is asked for; give another folder"),
+        ({"most": 1.0}, "holds a run with most = nan, and 1.0 is asked for"),
+        ({"cap": 2.0}, "holds a run with cap = None, and 2.0 is asked for"),
+    ],
+)
+def test_other_settings_are_one_clear_error(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    opened(tmp_path).add("a", Solve("of a record"))
+    with pytest.raises(InputError, match=said):
+        opened(tmp_path, SETTINGS | change)
+    fewer = {name: value for name, value in SETTINGS.items() if name not in change}
+    if len(fewer) < len(SETTINGS):
+        with pytest.raises(InputError, match="None is asked for"):
+            opened(tmp_path, fewer)
+    assert len(opened(tmp_path).kept) == 1
+
+
 def test_a_run_of_other_code_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened(tmp_path).add("a", Solve("of a record"))
     monkeypatch.setattr("wholebody.base.records.source_digest", lambda: "another")
@@ -130,7 +151,7 @@ def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, text: str, s
     path.write_text(text, errors="surrogateescape")
     before = path.read_bytes()
     with pytest.raises(FileFormatError, match=said):
-        opened(tmp_path)
+        opened(tmp_path, {})
     assert path.read_bytes() == before
 
 

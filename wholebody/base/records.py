@@ -7,7 +7,7 @@ import functools
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
@@ -28,17 +28,19 @@ class RecordFile(Generic[T]):
     not finite come back as they were. `kept` has the records by key, in the order in which the keys came.
 
     `content` says in words what the records are, `make` makes one of the plain values that `dataclasses.asdict` gives
-    (of a text it gets the text). InputError for a run that other code began, or a file that cannot be written;
-    FileFormatError for another file, or version.
+    (of a text it gets the text), `settings` are plain values of the run. InputError for other settings, or a file that
+    cannot be written; FileFormatError for another file, or version.
     """
 
-    def __init__(self, path: Path, content: str, make: Callable[[Any], T]) -> None:
+    def __init__(
+        self, path: Path, content: str, make: Callable[[Any], T], settings: Mapping[str, Any] | None = None
+    ) -> None:
         make_folder(path.parent)
         if path.exists() and not path.is_file():
             raise InputError(f"{path} is no file; give another folder")
         self.path, self._make, self._read = path, make, 0
         self.kept: dict[str, T] = {}
-        self._head = {"content": content, "version": "1.0", "code": source_digest()}
+        self._head = {"content": content, "version": "1.0", "code": source_digest(), **(settings or {})}
         with self._opened():
             pass
 
@@ -105,12 +107,13 @@ class RecordFile(Generic[T]):
         for name in ("content", "version"):
             if found[name] != self._head[name]:
                 raise self._foreign(f"its {name} is {found[name]}, not {self._head[name]}")
-        code, wanted = found.get("code"), self._head["code"]
-        if code != wanted:
-            raise InputError(
-                f"{self.path.parent} holds a run with code = {one_line(str(code))}, and {wanted} is asked for; give "
-                "another folder"
-            )
+        for name in {**self._head, **found}:
+            kept, wanted = found.get(name), self._head.get(name)
+            if _line(kept) != _line(wanted):  # as text: NaN is equal to itself, and tuples to lists
+                raise InputError(
+                    f"{self.path.parent} holds a run with {name} = {one_line(str(kept))}, and {one_line(str(wanted))} "
+                    "is asked for; give another folder, or the settings of that run to go on with it"
+                )
 
     def _foreign(self, why: str) -> FileFormatError:
         content = self._head["content"]
