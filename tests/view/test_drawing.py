@@ -36,6 +36,15 @@ def test_a_capsule_is_where_the_capsule_is() -> None:
     assert 0.97 * exact < volume(vertices, faces) < exact
 
 
+def test_a_cylinder_is_along_z() -> None:
+    """Three.js has cylinders along y."""
+    made = drawing.piece(coal.Cylinder(0.1, 0.6), "post", LOOK.figure)
+    shape, matrix = made["geometries"][0], np.array(made["object"]["matrix"]).reshape(4, 4).T
+    assert (shape["radiusTop"], shape["radiusBottom"], shape["height"]) == pytest.approx((0.1, 0.1, 0.6))
+    np.testing.assert_allclose(np.abs(matrix @ (0.0, 0.3, 0.0, 1.0)), (0.0, 0.0, 0.3, 1.0), atol=1e-12)
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1.0)
+
+
 def test_the_faces_of_a_hull_wind_outwards() -> None:
     cloud = np.random.default_rng(3).normal(size=(50, 3)) + 5.0
     points = coal.StdVec_Vec3s()

@@ -106,7 +106,7 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
     try:
         for name in names:
             try:
-                outcomes[name] = Outcome(*child.call(attempt, kind, name, seconds=timeout))
+                outcomes[name] = child.call(attempt, kind, name, seconds=timeout)
             except EndedError as error:
                 said = f": {error.said}" if error.said else ""
                 late = f"no answer within {timeout:.0f} s"
@@ -116,12 +116,12 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
     return outcomes
 
 
-def attempt(kind: str, name: str) -> tuple[bool, str]:
-    """Try a name in this process: whether it works, and the finding or the reason of the failure."""
+def attempt(kind: str, name: str) -> Outcome:
+    """Try a name in this process."""
     try:
-        return True, CHECKS[kind](name)
+        return Outcome(True, CHECKS[kind](name))
     except Exception as error:  # the check reports every failure
-        return False, f"{type(error).__name__}: {error}".strip().splitlines()[0]
+        return Outcome(False, f"{type(error).__name__}: {error}".strip().splitlines()[0])
 
 
 State = Literal["works", "absent", "broken"]

@@ -16,10 +16,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import Person
 from wholebody.geometry.flesh import mark_flesh
 from wholebody.geometry.hull import hull_piece
+from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.pieces import CORNERS
 
 
 class Solid(NamedTuple):
@@ -106,38 +107,32 @@ def urdf_text(spec: BodySpec, extension: str = "") -> str:
 def _with_virtual_masses(spec: BodySpec) -> list[Link]:
     """The links, those without mass between two joints of a ball joint with `VIRTUAL_MASS` of the next one."""
     outwards = {joint.parent: joint.child for joint in spec.joints}
-    moving = {joint.child for joint in spec.joints}
     masses = {link.name: link.mass for link in spec.links}
     taken = dict.fromkeys(masses, 0.0)
     for link in spec.links:
         heavy = link.name
-        while not masses[heavy] and heavy in outwards:
+        while not masses[heavy]:
             heavy = outwards[heavy]
-        if not link.mass and link.name in moving and masses[heavy]:
-            taken[heavy] += VIRTUAL_MASS
-    made = []
-    for link in spec.links:
-        if not link.mass and link.name in moving:
-            # Its moment of inertia about any axis, kg m^2.
-            made.append(with_values(link, mass=VIRTUAL_MASS, inertia=(1e-9,) * 3))
-        else:
-            made.append(with_values(link, mass=link.mass - taken[link.name]) if link.mass else link)
-    return made
+        taken[heavy] += 0.0 if link.mass else VIRTUAL_MASS
+    return [
+        # a moment of inertia about any axis, kg m^2
+        with_values(link, mass=link.mass - taken[link.name])
+        if link.mass
+        else with_values(link, mass=VIRTUAL_MASS, inertia=(1e-9,) * 3)
+        for link in spec.links
+    ]
 
 
 def _link(link: Link, solids: Sequence[Solid]) -> list[str]:
-    if not link.mass and not solids:
-        return [f'  <link name="{link.name}"/>']
-    lines = [f'  <link name="{link.name}">']
-    if link.mass:
-        ixx, iyy, izz = link.inertia
-        lines += [
-            "    <inertial>",
-            f'      <origin xyz="{digits(link.center)}"/>',
-            f'      <mass value="{_digit(link.mass)}"/>',
-            f'      <inertia ixx="{_digit(ixx)}" ixy="0" ixz="0" iyy="{_digit(iyy)}" iyz="0" izz="{_digit(izz)}"/>',
-            "    </inertial>",
-        ]
+    ixx, iyy, izz = link.inertia
+    lines = [
+        f'  <link name="{link.name}">',
+        "    <inertial>",
+        f'      <origin xyz="{digits(link.center)}"/>',
+        f'      <mass value="{_digit(link.mass)}"/>',
+        f'      <inertia ixx="{_digit(ixx)}" ixy="0" ixz="0" iyy="{_digit(iyy)}" iyz="0" izz="{_digit(izz)}"/>',
+        "    </inertial>",
+    ]
     for tag in ("visual", "collision"):
         for solid in solids:
             lines += [
@@ -179,15 +174,9 @@ def _geometry(solid: Solid) -> str:
     if solid.mesh is not None:
         file, scale = solid.mesh
         return f'<mesh filename="{file}" scale="{digits(scale)}"/>'
-    if kind == "Sphere":
-        return f'<sphere radius="{_digit(shape.radius)}"/>'
     if kind == "Capsule":
         return f'<cylinder radius="{_digit(shape.radius)}" length="{_digit(2.0 * shape.halfLength)}"/>'
-    if kind == "Box":
-        return f'<box size="{digits(2.0 * np.array(shape.halfSide))}"/>'
-    raise InputError(
-        f"piece {solid.name!r} is a {kind} without a mesh file; URDF knows spheres, cylinders, boxes, meshes"
-    )
+    return f'<box size="{digits(2.0 * np.array(shape.halfSide))}"/>'
 
 
 def _origin(placement: pin.SE3) -> str:
@@ -214,8 +203,7 @@ def model_of(spec: BodySpec) -> pin.Model:
 
 def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[str, str], ...]) -> pin.GeometryModel:
     """Return Pinocchio's geometry: the pieces on their segments, and the pairs that can touch."""
-    geometry = pin.GeometryModel()
-    index = {}
+    pieces = []
     for solid in solids:
         frame_id = model.getFrameId(solid.segment)
         frame = model.frames[frame_id]
@@ -223,11 +211,13 @@ def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[
             solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
         )
         piece.meshColor[:] = (0.85, 0.68, 0.55, 1.0)  # red, green, blue, opacity
-        index[solid.name] = geometry.addGeometryObject(piece)
+        pieces.append(piece)
+    index = {solid.name: number for number, solid in enumerate(solids)}
+    numbers = [sorted((index[a], index[b])) for a, b in pairs]
+    geometry = geometry_model(pieces, np.array(numbers, dtype=np.intp).reshape(-1, 2))
+    for number, solid in enumerate(solids):
         if solid.flesh:
-            mark_flesh(model, geometry, index[solid.name])
-    for a, b in pairs:
-        geometry.addCollisionPair(pin.CollisionPair(*sorted((index[a], index[b]))))
+            mark_flesh(model, geometry, number)
     return geometry
 
 
@@ -269,5 +259,4 @@ def tapered(radius_start: float, radius_end: float, length: float, what: str) ->
 
 def box(size: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a box about the origin: eight vertices, twelve triangles."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return _convex(corners * np.array(size), what)
+    return _convex(0.5 * CORNERS * np.array(size), what)

@@ -120,6 +120,23 @@ class Follower(NamedTuple):
         return (value - self.offset) / self.slope
 
 
+class Law(NamedTuple):
+    """A joint's value is that of another, by its name or number, times a slope plus an offset."""
+
+    leader: Any
+    slope: float
+    offset: float
+
+
+def led(laws: Mapping[Any, Law], joint: Any) -> Law:
+    """A joint's value by the joint that leads it and follows none; by itself where it follows none."""
+    found = Law(joint, 1.0, 0.0)
+    while found.leader in laws:
+        above = laws[found.leader]
+        found = Law(above.leader, found.slope * above.slope, found.offset + found.slope * above.offset)
+    return found
+
+
 Articulated: TypeAlias = Any
 """A `Figure`, for the functions that make its parts: the module of figures imports this one."""
 
@@ -219,12 +236,17 @@ def zero_within_limits(model: pin.Model) -> Array:
     return q
 
 
+def follows(joint: Any) -> bool:
+    """Whether a joint of a model follows another (mimic)."""
+    return bool(joint.shortname() == "JointModelMimic")
+
+
 def followers_of(model: pin.Model) -> dict[str, Follower]:
     """Return the joints of a model that follow another one."""
     found: dict[str, Follower] = {}
     leader: dict[int, str] = {}
     for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
-        if joint.shortname() == "JointModelMimic":
+        if follows(joint):
             law = joint.extract()
             place = int(joint.idx_q)
             found[name] = Follower(leader[place], place, float(law.scaling), float(law.offset))

@@ -69,7 +69,7 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
         if one.root == "several":
             raise InputError(f"{one.name!r} is several figures; mount one on another before they are joined")
         check_single(one, one.name)
-    figure = other.reduced(other.joints) if other.roots else other
+    figure = welded(other)
     model, part = _with(pin.Model(base.model), figure, prefix, frame, at)
     joints = (0, *(model.getJointId(joint) for joint in list(base.model.names)[1:]))
     frames = tuple(model.getFrameId(one.name, one.type) for one in base.model.frames)
@@ -87,6 +87,11 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
     excluded = (*known.excluded, *excluded)
     description = with_values(known, postures=postures, chains=chains, excluded=excluded, person=person)
     return model, _geometry(parts, [tested]), description, _visual(parts)
+
+
+def welded(figure: Articulated) -> Articulated:
+    """The figure with its free root fixed as in its first posture; itself where it is fixed."""
+    return figure.reduced(figure.joints) if figure.roots else figure
 
 
 def _carrying(base: Articulated, frame: int) -> tuple[str, ...]:
@@ -252,13 +257,13 @@ def _postures(members: Mapping[str, Member]) -> dict[str, Callable[[Articulated]
     """The named postures: that of all first postures, those that several may have, and those of each."""
     figures = {name: member.figure for name, member in members.items()}
     first = next(iter(figures.values())).postures[0]
-    found: dict[str, Callable[[Articulated], Array]] = {first: partial(_joined_posture, chosen={})}
+    found: dict[str, Callable[[Articulated], Array]] = {first: partial(posture_of_all, postures={})}
     for posture in dict.fromkeys(posture for figure in figures.values() for posture in figure.postures):
         chosen = {name: posture for name, figure in figures.items() if posture in figure.postures}
-        found.setdefault(posture, partial(_joined_posture, chosen=chosen))
+        found.setdefault(posture, partial(posture_of_all, postures=chosen))
     for name, figure in figures.items():
         for posture in figure.postures:
-            found[f"{name}/{posture}"] = partial(_joined_posture, chosen={name: posture})
+            found[f"{name}/{posture}"] = partial(posture_of_all, postures={name: posture})
     return found
 
 
@@ -278,10 +283,6 @@ def posture_of_all(figure: Articulated, postures: Mapping[str, str | Array]) -> 
             own = checks.posture(given, one.model.nq, f"posture of {name!r}")
         figure.part(name, q)[:] = own
     return q
-
-
-def _joined_posture(figure: Articulated, chosen: Mapping[str, str]) -> Array:
-    return np.asarray(figure.posture(chosen))
 
 
 def _mounted_posture(made: Articulated, base: Articulated, posture: str, other: Articulated, prefix: str) -> Array:

@@ -20,13 +20,10 @@ from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.fields import Range
 from wholebody.figures.figure import Figure
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
-from wholebody.geometry.hull import around, hull_piece
+from wholebody.geometry.hull import cylinder_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh, read_parts
 from wholebody.geometry.pieces import LARGEST, SMALLEST
-
-CYLINDER_SIDES = 32
-"""A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
 
 _log = logging.getLogger(__name__)
 
@@ -78,10 +75,8 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
         notes = (f"its {shape.kind} is {least:.2g} m thin, so it is made {SMALLEST} m thick",)
     if shape.kind != "cylinder":
         return [(getattr(coal, shape.kind.capitalize())(*size), pin.SE3.Identity())], notes
-    ring = around(size[0], CYLINDER_SIDES)
-    corners = [np.column_stack([ring, np.full(CYLINDER_SIDES, z)]) for z in (-0.5 * size[1], 0.5 * size[1])]
-    piece = hull_piece(np.vstack(corners), "cylinder")
-    return [(piece.geometry, piece.placement)], notes
+    # its corners protrude by 0.5 % of the radius
+    return [(piece.geometry, piece.placement) for piece in cylinder_pieces(size[0], size[1], sides=32)], notes
 
 
 def drawn_pieces(visual: pin.GeometryObject, link: str) -> list[tuple[Any, pin.SE3]]:

@@ -138,11 +138,6 @@ def member(name: str, given: Figure | tuple[Figure, Any]) -> Member:
     return Member(one, placement(at, f"{name!r}: at"))
 
 
-def welded(figure: Figure) -> Figure:
-    """The figure with its free root fixed as in its first posture; itself where it is fixed."""
-    return figure.reduced(figure.joints) if figure.roots else figure
-
-
 def one_figure(figure: object, what: str) -> Figure:
     """A figure that is one alone; an InputError for something else, and for several that were joined."""
     found = checks.instance(figure, Figure, what, "load one with wb.load('human')")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +10,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import MOST_TURNED, warn
 from wholebody.base.errors import InputError
+from wholebody.figures.description import followers_of
 
 HEAVIEST = 1e9  # kilograms: greatest mass carried by one joint
 LARGEST = 1e6  # largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes
@@ -54,13 +55,6 @@ def joint_of(model: pin.Model, freedom: int) -> int:
     return next(
         (joint for joint in range(1, model.njoints) if 0 <= freedom - model.idx_vs[joint] < model.nvs[joint]), 0
     )
-
-
-def along_z(axis: Array) -> Array:
-    """A rotation (3, 3) whose third column is a unit direction."""
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(axis)))], axis)
-    x /= np.linalg.norm(x)
-    return np.column_stack((x, np.cross(axis, x), axis))
 
 
 FAR_OUT = 1.0  # radians beyond a limit from which a value was probably meant in degrees
@@ -122,42 +116,34 @@ LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLi
 """Values of a model that may be infinite: an archive writes them and cannot read them."""
 
 
-class _Follower(NamedTuple):
-    """A joint that follows another one (mimic)."""
-
-    number: int
-    leader: int
-    slope: float
-    offset: float
-    axis: Array  # (6,) it slides along, or turns about, by a unit of its own value
-
-
 def archived(model: pin.Model) -> tuple[Any, ...]:
     """What a pickled model is made from again, for `copyreg`: Pinocchio's archives lose infinities and followers."""
     limits = {name: np.array(getattr(model, name)) for name in LIMITS}
-    finite, joints, followers = pin.Model(model), list(model.joints), list[_Follower]()
+    finite, followers = pin.Model(model), []
     for name, values in limits.items():
         setattr(finite, name, np.nan_to_num(values))
-    for number, joint in enumerate(joints):
-        if joint.shortname() == "JointModelMimic":
-            law = joint.extract()
-            leader = next(k for k, other in enumerate(joints) if other.nq and other.idx_q == law.idx_q)
-            axis = np.asarray(joint.createData().S, dtype=float).ravel() / law.scaling
-            followers.append(_Follower(number, leader, float(law.scaling), float(law.offset), axis))
+    for name, law in followers_of(model).items():
+        number = model.getJointId(name)
+        axis = np.asarray(model.joints[number].createData().S, dtype=float).ravel() / law.slope
+        followers.append((number, model.getJointId(law.joint), law.slope, law.offset, axis))
     return _restored, (finite.saveToString(), limits, followers)
 
 
-def _restored(archive: str, limits: dict[str, Array], followers: list[_Follower]) -> pin.Model:
+def _restored(
+    archive: str, limits: dict[str, Array], followers: list[tuple[int, int, float, float, Array]]
+) -> pin.Model:
+    """The model; a follower is its number, its leader's, slope and offset, and its axis (6,) by a unit of its value."""
     model = pin.Model()
     model.loadFromString(archive)
     for name, values in limits.items():
         setattr(model, name, values)
-    for one in followers:  # archives of Pinocchio 3.8 leave out how many columns of the Jacobian they have
-        joint, leader, read = _along(one.axis), model.joints[one.leader], model.joints[one.number].extract()
+    # archives of Pinocchio 3.8 leave out how many columns of the Jacobian they have
+    for number, leading, slope, offset, axis in followers:
+        joint, leader, read = _along(axis), model.joints[leading], model.joints[number].extract()
         joint.setIndexes(leader.id, leader.idx_q, leader.idx_v, leader.idx_vExtended)
-        made = pin.JointModelMimic(pin.JointModel(joint), one.slope, one.offset)
-        made.setIndexes(one.number, read.idx_q, read.idx_v, read.idx_vExtended)
-        model.joints[one.number] = pin.JointModel(made)
+        made = pin.JointModelMimic(pin.JointModel(joint), slope, offset)
+        made.setIndexes(number, read.idx_q, read.idx_v, read.idx_vExtended)
+        model.joints[number] = pin.JointModel(made)
     return model
 
 

@@ -162,7 +162,4 @@ class Population:
         return np.asarray(found)
 
 
-@cache
-def population(sex: str) -> Population:
-    """Return the distribution of a sex, "male" or "female"."""
-    return Population(sex)
+population = cache(Population)  # of a sex, "male" or "female"

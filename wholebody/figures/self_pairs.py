@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.figures.description import ExcludedPair, limits_of, zero_within_limits
 from wholebody.figures.state import State, root_freedoms
+from wholebody.geometry.large_models import add_pairs, pairs_of
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 UNLIMITED = np.pi
@@ -37,8 +38,7 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int) ->
         ExcludedPair(names[first[k]], names[second[k]], "on one joint" if together[k] else "neighbours")
         for k in np.flatnonzero(together | neighbours)
     ]
-    for i, j in zip(first[tested].tolist(), second[tested].tolist(), strict=True):
-        geometry.addCollisionPair(pin.CollisionPair(i, j))
+    add_pairs(geometry, np.column_stack([first[tested], second[tested]]))
     postures = random_postures(model, samples, seed=0)
     touching = _seldom_free(model, geometry, postures)
     for number, seldom in touching.items():
@@ -53,17 +53,13 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int) ->
 
 def drop_pairs(geometry: pin.GeometryModel, numbers: Iterable[int], reason: str) -> list[ExcludedPair]:
     """Remove pairs, given by their indices among the collision pairs, and return them with a reason."""
-    gone = set(numbers)
+    gone = sorted(set(numbers))
     if not gone:
         return []
-    # Read all pairs first: Pinocchio's list hands out references, which move when an entry is removed.
-    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
-    names = [piece.name for piece in geometry.geometryObjects]
+    pairs, names = pairs_of(geometry), [piece.name for piece in geometry.geometryObjects]
     geometry.removeAllCollisionPairs()
-    for number, (first, second) in enumerate(pairs):
-        if number not in gone:
-            geometry.addCollisionPair(pin.CollisionPair(first, second))
-    return [ExcludedPair(names[pairs[number][0]], names[pairs[number][1]], reason) for number in sorted(gone)]
+    add_pairs(geometry, np.delete(pairs, gone, axis=0))
+    return [ExcludedPair(names[first], names[second], reason) for first, second in pairs[gone].tolist()]
 
 
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:

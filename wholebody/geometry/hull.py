@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
-from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.geometry.pieces import CORNERS, LARGEST, SMALLEST, Piece, hull_triangles
 
 MOST_NEIGHBOURS = 255  # most edges at one vertex that coal can represent
 
@@ -51,22 +51,26 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
     normals = cross(corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]])
     inward = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0
     faces[inward] = faces[inward][:, [0, 2, 1]]
-    return Piece(coal_convex(corners, faces), pin.SE3(np.eye(3), centre), float(hull.volume))
+    return Piece(coal_convex(corners, coal_triangles(faces)), pin.SE3(np.eye(3), centre), float(hull.volume))
 
 
 def thickened(points: Array) -> Array:
     """Corners of a cube of twice `SMALLEST` about every point: a hull of them is solid, however thin the points are."""
-    cube = SMALLEST * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-    return np.asarray((points[:, None] + cube).reshape(-1, 3))
+    return np.asarray((points[:, None] + SMALLEST * CORNERS).reshape(-1, 3))
 
 
-def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
-    """Convex of coal with corners (n, 3) and outward triangles (m, 3)."""
+def coal_convex(corners: Array, triangles: Any) -> Any:
+    """Convex of coal with corners (n, 3) and `coal_triangles`."""
     vertices = coal.StdVec_Vec3s()
     vertices.extend(list(corners))
+    return coal.Convex(vertices, triangles)
+
+
+def coal_triangles(faces: NDArray[np.int_]) -> Any:
+    """Outward triangles (m, 3) as coal takes them."""
     triangles = coal.StdVec_Triangle()
     triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
-    return coal.Convex(vertices, triangles)
+    return triangles
 
 
 def check_points(points: ArrayLike, what: str, one: str = "point", many: str = "points") -> Array:
@@ -232,18 +236,20 @@ SECTORS, TUBE_SIDES = 24, 12
 """Pieces of a ring, and sides of its tube: 24 and 12 are 1 % of the radius and 4 % of the tube too far out."""
 
 
-@lru_cache(maxsize=1)
-def _unit_cylinder() -> tuple[Piece, Any]:
-    """The cylinder of radius 1 and length 1, and the triangles of its hull, which take longest to find."""
-    ring = around(1.0, SIDES)
-    piece = hull_piece(np.vstack([np.column_stack([ring, np.full(SIDES, z)]) for z in (-0.5, 0.5)]), "Cylinder")
-    return piece, _triangles(piece.geometry)
+@lru_cache(maxsize=4)
+def _unit_cylinder(sides: int) -> tuple[Array, Any, float]:
+    """Corners (n, 3) and triangles, which take longest to find, and volume of the prism around a cylinder of size 1."""
+    ring = around(1.0, sides)
+    piece = hull_piece(np.vstack([np.column_stack([ring, np.full(sides, z)]) for z in (-0.5, 0.5)]), "Cylinder")
+    return np.array(piece.geometry.points()), coal_triangles(hull_triangles(piece.geometry)), piece.volume
 
 
 @lru_cache(maxsize=1024)  # scenes have many things of one size, which share what coal and others compute of them
-def cylinder_pieces(radius: float, length: float) -> tuple[Piece, ...]:
-    """The prism around a cylinder along z, centred at its origin."""
-    return (_stretched(*_unit_cylinder(), np.array((radius, radius, length))),)
+def cylinder_pieces(radius: float, length: float, sides: int = SIDES) -> tuple[Piece, ...]:
+    """The prism of so many sides around a cylinder along z, centred at its origin."""
+    corners, triangles, volume = _unit_cylinder(sides)
+    geometry = coal_convex(corners * (radius, radius, length), triangles)
+    return (Piece(geometry, pin.SE3.Identity(), volume * radius**2 * length),)
 
 
 @lru_cache(maxsize=64)
@@ -262,17 +268,3 @@ def around(radius: float, sides: int) -> Array:
     """Corners (sides, 2) of the regular polygon around a circle."""
     angles = 2.0 * math.pi * np.arange(sides) / sides
     return np.column_stack([np.cos(angles), np.sin(angles)]) * (radius / math.cos(math.pi / sides))
-
-
-def _stretched(piece: Piece, triangles: Any, scale: Array) -> Piece:
-    """A piece about its origin, a Convex with these triangles, stretched along the axes by a scale (3,)."""
-    vertices = coal.StdVec_Vec3s()
-    vertices.extend(list(np.array(piece.geometry.points()) * scale))
-    return Piece(coal.Convex(vertices, triangles), pin.SE3.Identity(), piece.volume * float(np.prod(scale)))
-
-
-def _triangles(convex: Any) -> Any:
-    """The triangles of a Convex as coal takes them."""
-    triangles = coal.StdVec_Triangle()
-    triangles.extend([convex.polygons(k) for k in range(convex.num_polygons)])
-    return triangles

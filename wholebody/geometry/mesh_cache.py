@@ -23,7 +23,7 @@ import pinocchio as pin
 
 from wholebody.base.errors import InputError
 from wholebody.base.files import write
-from wholebody.geometry.hull import coal_convex
+from wholebody.geometry.hull import coal_convex, coal_triangles
 from wholebody.geometry.pieces import Piece, hull_triangles
 from wholebody.version import __version__
 
@@ -81,7 +81,7 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
 
     stored, added, notes = cached_entry(digest.hexdigest(), made)
     pieces = tuple(
-        Piece(coal_convex(points, triangles), pin.SE3(np.eye(3), centre), volume)
+        Piece(coal_convex(points, coal_triangles(triangles)), pin.SE3(np.eye(3), centre), volume)
         for points, triangles, centre, volume in stored
     )
     return ConvexPieces(pieces, added, tuple(what + note for note in notes))

@@ -60,7 +60,7 @@ def with_own_places(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
     return tuple(Piece(piece.geometry, pin.SE3(piece.placement), piece.volume) for piece in pieces)
 
 
-_ENDS = np.array(list(np.ndindex(2, 2, 2)))  # (8, 3) which of both sides the corners of a box are at, along each axis
+CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0  # (8, 3) of a cube of side 2 about its centre
 
 
 def box_corners(geometry: Any) -> Array:
@@ -68,8 +68,7 @@ def box_corners(geometry: Any) -> Array:
     # coal writes the box into the shape. A copy is used, because pickles of scenes would change otherwise.
     own = geometry.clone()
     own.computeLocalAABB()
-    sides = np.array([own.aabb_local.min_, own.aabb_local.max_])
-    return np.asarray(sides[_ENDS, (0, 1, 2)])
+    return np.where(CORNERS < 0.0, own.aabb_local.min_, own.aabb_local.max_)
 
 
 class SweptPoints(NamedTuple):
@@ -89,7 +88,6 @@ _NO_FACES = np.zeros((0, 4))
 _NO_AXIS = np.zeros(3)
 _CENTER = np.zeros((1, 3))
 _ALONG = np.array([0.0, 0.0, 1.0])
-_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _SIDES = np.hstack([np.concatenate([np.eye(3), -np.eye(3)]), np.zeros((6, 1))])
 
 
@@ -130,7 +128,7 @@ def swept_points_of(geometries: Sequence[Any]) -> list[SweptPoints]:
 
 def _of_boxes(geometries: Sequence[Any]) -> Iterator[SweptPoints]:
     half = np.array([geometry.halfSide for geometry in geometries]).reshape(-1, 3)
-    points, faces = _CORNERS * half[:, None], np.tile(_SIDES, (len(half), 1, 1))
+    points, faces = CORNERS * half[:, None], np.tile(_SIDES, (len(half), 1, 1))
     faces[:, :3, 3] = faces[:, 3:, 3] = half
     for own, sides, box, lengths in zip(points, faces, half, half.tolist(), strict=True):
         yield SweptPoints(own, 0.0, sides, math.hypot(*lengths), _NO_AXIS, 2.0 * min(lengths), box)

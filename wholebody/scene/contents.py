@@ -14,7 +14,8 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.loading import join, welded
+from wholebody.figures.joining import welded
+from wholebody.figures.loading import join
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
 from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
@@ -87,7 +88,7 @@ class SceneContents(checks.FixedAttributes):
         Of more than 2,000 pieces it has no table of pair numbers: do not call `addCollisionPair`, `findCollisionPair`
         or `existCollisionPair` on it then.
         """
-        return self._build().geometry
+        return self.built.geometry
 
     @property
     def objects(self) -> Mapping[str, SceneObject]:
@@ -102,23 +103,30 @@ class SceneContents(checks.FixedAttributes):
     @property
     def piece_owner(self) -> tuple[str, ...]:
         """The segment or object that every piece is part of, in the order of the geometry model."""
-        return self._build().owners
+        return self.built.owners
 
     @property
     def excluded_pairs(self) -> Mapping[tuple[str, str], str]:
         """Pairs of owners that are not tested because of the scene, with the reason."""
-        self._build()
+        _ = self.built
         return MappingProxyType(self._excluded)
 
     @property
     def pair_table(self) -> PairTable:
         """Pieces and pairs as arrays; ``pair_table.pairs`` has the two pieces of each collision pair."""
-        return self._build().table
+        return self.built.table
 
     @property
     def built(self) -> SceneGeometry:
         """The geometry model of the present things, with its indices."""
-        return self._built or self._build()
+        built = self._built
+        if built is None:
+            with self._lock:
+                built = self._built
+                if built is None:
+                    self._excluded = {}
+                    built = self._built = assemble(self.figure, self._objects.values(), self._excluded)
+        return built
 
     def frame_id(self, name: str) -> int:
         """Index of a frame of the figure."""
@@ -288,16 +296,6 @@ class SceneContents(checks.FixedAttributes):
         if name in self._objects or name in self.figure.segments or name in self.figure.members:
             raise InputError(f"the scene already has {name!r}; give the new object another name, or move() the old one")
         return name
-
-    def _build(self) -> SceneGeometry:
-        built = self._built
-        if built is None:
-            with self._lock:
-                built = self._built
-                if built is None:
-                    self._excluded = {}
-                    built = self._built = assemble(self.figure, self._objects.values(), self._excluded)
-        return built
 
     # ---- copies
 

@@ -286,11 +286,9 @@ def _touching_at_rest(
 ) -> set[tuple[str, str]]:
     """Pairs (segment, carried thing) that touch in the figure's first posture."""
     held = [k for k, owner in enumerate(owners) if owner in carried]  # before what stands in the world
-    probe = geometry_model(pieces[: held[-1] + 1])
-    for second in held:
-        for first in range(len(figure.geometry.geometryObjects)):
-            if pieces[first].parentJoint != pieces[second].parentJoint:
-                probe.addCollisionPair(pin.CollisionPair(first, second))
+    joint, own = [piece.parentJoint for piece in pieces], range(len(figure.geometry.geometryObjects))
+    pairs = [(k, thing) for thing in held for k in own if joint[k] != joint[thing]]
+    probe = geometry_model(pieces[: held[-1] + 1], np.array(pairs, dtype=np.intp).reshape(-1, 2))
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)

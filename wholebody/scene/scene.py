@@ -58,7 +58,8 @@ class Scene(SceneContents):
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Every pair of the scene nearer than `within` metres at the posture q, shape (nq,), nearest first.
 
-        These are the pairs that a posture changes, `pair_table.pairs`; see `overlapping` for those of things too.
+        These are the pairs that a posture changes, `pair_table.pairs`; see `overlapping` for those of things too. Their
+        field `pair` has indices of pieces: `piece_owner[i]` is the segment or object of piece i.
 
         Raises:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.

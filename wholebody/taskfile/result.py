@@ -20,6 +20,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.solution import Solution
 from wholebody.taskfile.task import Task, read_task
+from wholebody.taskfile.writing import root_places
 from wholebody.tasks.base import Measure
 from wholebody.version import __version__
 
@@ -28,11 +29,10 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
     """Return the content of result.json."""
     figure, q = task.problem.scene.figure, solution.q
     state = State(figure.model).update(q)
-    places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
     errors = [
         (name, *distance_and_angle(goal, state)) for name, goal in zip(task.goal_names, task.problem.goals, strict=True)
     ]
-    roots = {name: q[first : first + 7].tolist() for name, first in places.items()}
+    roots = root_places(figure, q)
     return {
         "wholebody": __version__,
         "task": os.path.relpath(task.path.resolve(), folder.resolve()),

@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wholebody import tasks
 from wholebody.base import files
+from wholebody.base.arrays import Array
 from wholebody.base.checks import instance, text
 from wholebody.base.errors import InputError
 from wholebody.base.files import title_of
@@ -142,9 +143,14 @@ def _start(problem: Problem) -> dict[str, Any]:
     start: dict[str, Any] = {"posture": figure.postures[0]}
     if joints:
         start["joints"] = joints
-    places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
-    roots = {name: q[first : first + 7].tolist() for name, first in places.items()}
+    roots = root_places(figure, q)
     return start | ({"root": roots["root"]} if "root" in roots else {"roots": roots} if roots else {})
+
+
+def root_places(figure: Figure, q: Array) -> dict[str, list[float]]:
+    """Position and quaternion x, y, z, w of each free root in a posture (nq,)."""
+    places = {name: int(figure.model.joints[joint].idx_q) for name, joint in figure.roots.items()}
+    return {name: q[first : first + 7].tolist() for name, first in places.items()}
 
 
 def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[str, Any]:

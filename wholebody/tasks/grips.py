@@ -17,7 +17,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, cross, with_values
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
-from wholebody.geometry.hull import coal_convex
+from wholebody.geometry.hull import coal_convex, coal_triangles
 from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes, filled
@@ -266,7 +266,7 @@ def _rounded(shape: Any) -> Any:
     planes = np.column_stack([normals, 0.9 * ball[3] - offsets])
     hull = ConvexHull(HalfspaceIntersection(planes, ball[:3]).intersections)
     used, triangles = np.unique(hull.simplices, return_inverse=True)
-    return coal_convex(hull.points[used], triangles.reshape(-1, 3))
+    return coal_convex(hull.points[used], coal_triangles(triangles.reshape(-1, 3)))
 
 
 def _by_twist(surface: Surface, thing: Surface, near: Nearest, state: State) -> Array:

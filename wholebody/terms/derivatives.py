@@ -13,7 +13,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.errors import InputError
 from wholebody.figures.model_check import joint_of
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import State
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Constraint, Goal, Measure
 
@@ -129,7 +129,7 @@ def _value(term: Any, state: State) -> Array:
 def _derivative(term: Any, state: State) -> Array:
     """Derivative (m, nv) of a term as it has it itself."""
     given = term.gradient(state) if isinstance(term, Measure) else term.jacobian(state)
-    return np.atleast_2d(state.wrench_jacobian(given) if isinstance(given, Wrench) else np.asarray(given, dtype=float))
+    return np.asarray(state.dense_jacobian(given), dtype=float)
 
 
 def _differences(term: Any, state: State, q: Array) -> tuple[Array, Array]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import coal
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import hull_triangles
+from wholebody.geometry.placement import along_z
 from wholebody.view.commands import floats, integers
 from wholebody.view.style import LOOK, Color
 
@@ -72,9 +72,9 @@ def _shape(geometry: Any, name: str) -> tuple[Three, tuple[float, float, float],
         return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, one, None, True
     if kind == "Capsule":
         return _triangles(*capsule_surface(float(geometry.radius), float(geometry.halfLength))), one, None, False
-    if kind in ("Cylinder", "Cone"):
-        top = float(geometry.radius) if kind == "Cylinder" else 0.0
-        size = {"radiusTop": top, "radiusBottom": float(geometry.radius), "height": 2 * float(geometry.halfLength)}
+    if kind == "Cylinder":
+        radius, height = float(geometry.radius), 2.0 * float(geometry.halfLength)
+        size = {"radiusTop": radius, "radiusBottom": radius, "height": height}
         return {"type": "CylinderGeometry", **size, "radialSegments": _AROUND}, one, _ALONG_Z, False
     if kind == "Halfspace":
         width, height, depth = LOOK.plate
@@ -92,25 +92,15 @@ _ALONG_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 
 def plate_placement(normal: Array, offset: float) -> Array:
     """Placement (4, 4) of the plate that represents the half-space n.x <= d: its upper face is in the plane."""
     placement = point_placement(normal * (offset - LOOK.plate[2] / 2))
-    placement[:3, :3] = _turned_to(normal)
+    placement[:3, :3] = along_z(normal)
     return placement
-
-
-def _turned_to(direction: Array) -> Array:
-    """A rotation (3, 3) whose third column is the direction; in floats, as NumPy's cross product takes 20 us."""
-    x, y, z = (float(part) for part in direction)
-    length = math.sqrt(x * x + y * y + z * z)
-    x, y, z = x / length, y / length, z / length
-    sign = 1.0 if z >= 0 else -1.0  # Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017
-    a, b = -1.0 / (sign + z), x * y * -1.0 / (sign + z)
-    return np.array([[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]], dtype=float)
 
 
 def arrow_placement(start: Array, direction: Array, length: float) -> Array:
     """Placement (4, 4), with scale, of the unit arrow from `start` along `direction`; long arrows keep their width."""
     width = min(length, LOOK.widest_arrow)
     placement = point_placement(start)
-    placement[:3, :3] = _turned_to(direction) * (width, width, length)
+    placement[:3, :3] = along_z(direction) * (width, width, length)
     return placement
 
 
@@ -128,7 +118,7 @@ def rod_placement(start: Array, end: Array, radius: float) -> Array | None:
     if length < 1e-6:
         return None
     placement = point_placement(start)
-    placement[:3, :3] = _turned_to(span) * (radius, radius, length)
+    placement[:3, :3] = along_z(span) * (radius, radius, length)
     return placement
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import atexit
 import importlib.util
-import math
 import re
 import socket
 import struct
@@ -17,8 +16,8 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any, NamedTuple
 
-from wholebody.base import checks
 from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.fields import Range
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 
@@ -176,9 +175,7 @@ def is_address(name: str) -> bool:
 
 def seconds(timeout: object) -> float:
     """Seconds to wait, which may be infinite; raises InputError where they are negative or no number."""
-    if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
-        return threading.TIMEOUT_MAX
-    return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
+    return min(Range(0.0, 1e9, "s", endless=True)(timeout, "timeout"), threading.TIMEOUT_MAX)
 
 
 def _bound(host: str, port: int) -> Any:

@@ -174,16 +174,13 @@ def _bones(world: Scene, motion: SkeletonMotion, aside: float) -> dict[str, list
         bones = places[:, joint] - places[:, parent]
         length = float(np.median(np.linalg.norm(bones, axis=1)))
         middles = 0.5 * (places[:, joint] + places[:, parent])
-        track = [pin.SE3(_along(way), middle) for way, middle in zip(bones, middles, strict=True)]
+        up = np.array([0.0, 0.0, 1.0])
+        turns = [pin.Quaternion.FromTwoVectors(up, way) for way in bones]  # which turn evenly from frame to frame
+        track = [pin.SE3(turn, middle) for turn, middle in zip(turns, middles, strict=True)]
         name = f"bone {motion.names[joint]}"
         world.add(Capsule(RADIUS, max(length, SHORT)), name=name, at=track[0], color=(0.25, 0.28, 0.33, 1.0))
         tracks[name] = track
     return tracks
-
-
-def _along(way: Array) -> Array:
-    """(3, 3) a rotation that brings z along a direction."""
-    return np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).toRotationMatrix())
 
 
 GAP = 6  # pixels between two pictures

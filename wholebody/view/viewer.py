@@ -17,6 +17,7 @@ from wholebody.assessment.posture import assess
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Range
 from wholebody.base.files import checked_target, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
@@ -153,8 +154,7 @@ class Viewer:
         if not postures:
             raise InputError("a motion has at least one posture; give a list of postures, each of shape (nq,)")
         step = checks.time_step(getattr(motion, "dt", 1 / 30) if dt is None else dt, "dt")
-        if not (isinstance(repeat, float) and math.isinf(repeat) and repeat > 0.0):
-            repeat = checks.number(repeat, "repeat", 1e-3, 1e9, "times, or math.inf")
+        repeat = Range(1e-3, 1e9, "times", endless=True)(repeat, "repeat")
         marked = [()] * len(postures) if overlaps is None else checks.listed(overlaps, "overlaps", "[frame.overlaps]")
         if len(marked) != len(postures):
             raise InputError(

@@ -58,6 +58,18 @@ def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
     assert "SRDF: passive_joint is not kept" in wb.load(urdf, srdf=srdf, root="free").notes
 
 
+def test_a_link_is_disabled_but_for_pairs_that_are_enabled(tmp_path: Path) -> None:
+    more = '<disable_default_collisions link="l0"/><enable_collisions link1="l0" link2="l4"/>'
+    group = '<group name="none"><group name="gone"/></group></robot>'
+    urdf, srdf = files(tmp_path, SRDF.replace("</robot>", more + group))
+    figure = wb.load(urdf, srdf=srdf)
+    names = [piece.name for piece in figure.geometry.geometryObjects]
+    tested = {frozenset((names[pair.first], names[pair.second])) for pair in figure.geometry.collisionPairs}
+    assert [pair for pair in tested if "l0:0" in pair] == [frozenset(("l0:0", "l4:0"))]
+    assert frozenset(("l1:0", "l3:0")) in tested
+    assert "SRDF: group 'none' names 'gone', which is no other group" in figure.notes
+
+
 def test_no_state_of_an_srdf_is_lost(tmp_path: Path) -> None:
     states = "".join(
         f'<group_state name="{name}" group="arm"><joint name="j1" value="{value}"/></group_state>'

@@ -14,18 +14,10 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown, warn_of_degrees
-from wholebody.figures.description import ROOT_JOINT, JointCone
+from wholebody.figures.description import ROOT_JOINT, JointCone, Law, follows, led
 from wholebody.figures.mjcf.compiled import BALL, FREE, HINGE, SLIDE, Compiled, placement
-from wholebody.figures.model_check import along_z
 from wholebody.figures.motion_ranges import ReachCone
-
-
-class Law(NamedTuple):
-    """A joint's value as ``slope * leader + offset``; joints by their numbers in MuJoCo."""
-
-    leader: int
-    slope: float
-    offset: float
+from wholebody.geometry.placement import along_z
 
 
 class RobotModel(NamedTuple):
@@ -43,7 +35,7 @@ class RobotModel(NamedTuple):
         q: Array = pin.neutral(self.model)
         for joint, index in self.joints.items():
             made, at = self.model.joints[index], int(compiled.model.jnt_qposadr[joint])
-            if made.shortname() == "JointModelMimic":
+            if follows(made):
                 continue
             kind = compiled.model.jnt_type[joint]
             if kind in (FREE, BALL):
@@ -197,7 +189,7 @@ class RobotBuilder:
                 continue
             why = self._unlike(row, first, second, mine)
             if not why:
-                given, own, other = self._law(row, first, second), _leading(laws, first), _leading(laws, second)
+                given, own, other = self._law(row, first, second), led(laws, first), led(laws, second)
                 slope = given.slope * other.slope / own.slope
                 law = Law(other.leader, slope, (given.slope * other.offset + given.offset - own.offset) / own.slope)
                 follower = own.leader
@@ -215,7 +207,7 @@ class RobotBuilder:
             self._notes.append(
                 f"{others} <equality> between bodies or tendons: not kept; these parts move by themselves"
             )
-        return {joint: _leading(laws, joint) for joint in laws}
+        return {joint: led(laws, joint) for joint in laws}
 
     def _unlike(self, row: int, first: int, second: int, mine: set[int]) -> str:
         """Why a joint does not follow another by an equality; empty if it does."""
@@ -261,15 +253,6 @@ class RobotBuilder:
                 "and not for the twist about it"
             )
         return made
-
-
-def _leading(laws: dict[int, Law], joint: int) -> Law:
-    """A joint's value by the joint that leads it and follows none; by itself where it follows none."""
-    found = Law(joint, 1.0, 0.0)
-    while found.leader in laws:
-        above = laws[found.leader]
-        found = Law(above.leader, found.slope * above.slope, found.offset + found.slope * above.offset)
-    return found
 
 
 def _inertia(theirs: Any, body: int) -> pin.Inertia:

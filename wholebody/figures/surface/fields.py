@@ -56,18 +56,6 @@ def ellipsoid(center: Any, radii: Any, rotation: Array | None = None) -> Field:
     return field
 
 
-def box(center: Any, half: Any, radius: float = 0.0) -> Field:
-    """A box with edges rounded by `radius`, which its half sides include."""
-    middle, inner = np.asarray(center, dtype=float), np.asarray(half, dtype=float) - radius
-
-    def field(points: Array) -> Array:
-        beyond = np.abs(points - middle) - inner
-        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-        return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0) - radius)
-
-    return field
-
-
 def half_space(point: Any, normal: Any) -> Field:
     """Everything on the side of a plane that its normal points away from."""
     origin, n = np.asarray(point, dtype=float), np.asarray(normal, dtype=float)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import coal
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid
-from wholebody.figures.surface.fields import Field, ball, box, ellipsoid, placed, round_cone
+from wholebody.figures.surface.fields import Field, placed, round_cone
 
 LEVEL = 0.005  # metres between two ovals
 
@@ -23,40 +22,24 @@ RAYS = np.arange(-0.4, 0.4, 0.002)  # metres from the middle at which the pieces
 
 
 def piece_field(solid: Solid) -> Field:
-    """The signed distance of a piece in its segment's frame."""
-    shape: Any = solid.geometry
-    if isinstance(shape, coal.Capsule):
-        half = float(shape.halfLength)
-        found = round_cone((0.0, 0.0, -half), (0.0, 0.0, half), float(shape.radius), float(shape.radius))
-    elif isinstance(shape, coal.Sphere):
-        found = ball(np.zeros(3), float(shape.radius))
-    elif isinstance(shape, coal.Ellipsoid):
-        found = ellipsoid(np.zeros(3), np.asarray(shape.radii))
-    else:
-        found = box(np.zeros(3), np.asarray(shape.halfSide))
+    """The signed distance of a capsule in its segment's frame; parts with a surface have no other pieces."""
+    half, radius = float(solid.geometry.halfLength), float(solid.geometry.radius)
+    found = round_cone((0.0, 0.0, -half), (0.0, 0.0, half), radius, radius)
     return placed(found, np.asarray(solid.placement.homogeneous))
 
 
 def caps(solids: Iterable[Solid], segment: str) -> list[tuple[Array, float]]:
-    """Centres (3,), in the segment's frame, and radii of the balls around which a limb's pieces lie, highest first."""
+    """Centres (3,) and radii of the balls at the ends of a limb's capsules, in its frame, the highest first."""
     found: list[tuple[Array, float]] = []
-    own = [s for s in solids if s.segment == segment and isinstance(s.geometry, (coal.Capsule, coal.Sphere))]
+    own = [one for one in solids if one.segment == segment and isinstance(one.geometry, coal.Capsule)]
     for solid in own:
+        half, radius = float(solid.geometry.halfLength), float(solid.geometry.radius)
+        ends = [np.asarray(solid.placement.act(np.array([0.0, 0.0, end]))) for end in (half, -half)]
         others = [piece_field(other) for other in own if other is not solid]
-        if any(_contains(other, solid) for other in others):
+        if any((other(np.array(ends)) + radius < 1e-6).all() for other in others):
             continue  # a core within the flesh
-        half = float(solid.geometry.halfLength) if isinstance(solid.geometry, coal.Capsule) else 0.0
-        for end in {half, -half}:
-            center = solid.placement.act(np.array([0.0, 0.0, end]))
-            found.append((np.asarray(center), float(solid.geometry.radius)))
+        found += [(end, radius) for end in ends]
     return sorted(found, key=lambda entry: -float(entry[0][2]))
-
-
-def _contains(outer: Field, solid: Solid) -> bool:
-    """Whether a capsule or a ball is within another piece."""
-    half = float(solid.geometry.halfLength) if isinstance(solid.geometry, coal.Capsule) else 0.0
-    ends = np.array([solid.placement.act(np.array([0.0, 0.0, end])) for end in (half, -half)])
-    return bool((outer(ends) + float(solid.geometry.radius) < 1e-6).all())
 
 
 def limb(balls: Sequence[tuple[Array, float]], smoothing: float = SMOOTHING) -> Field:

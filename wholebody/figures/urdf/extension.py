@@ -61,6 +61,7 @@ from wholebody.figures.motion_ranges import (
 )
 from wholebody.figures.self_pairs import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
+from wholebody.geometry.large_models import add_pairs
 
 SIZES = ("stature", "mass", "age", "shoes", "clothing")
 """Numbers of a person that a file has: the first two, and the others that are known."""
@@ -162,20 +163,18 @@ class _Reader:
         return Figure(name, self.model, self.geometry, self.element.get("detail", "own"), description)
 
     def _pairs(self) -> tuple[ExcludedPair, ...]:
-        number = {piece.name: k for k, piece in enumerate(self.geometry.geometryObjects)}
+        pieces = [piece.name for piece in self.geometry.geometryObjects]
         excluded: dict[frozenset[str], ExcludedPair] = {}
         for item in self.element.findall("untested"):
-            names = self._names(item, "pairs", "piece", set(number))
+            names = self._names(item, "pairs", "piece", set(pieces))
             if len(names) % 2:
                 self._fail("<untested> has a piece without partner in its pairs; write two names a pair")
             for a, b in zip(names[::2], names[1::2], strict=True):
                 excluded[frozenset((a, b))] = ExcludedPair(a, b, item.get("reason", ""))
         self.geometry.removeAllCollisionPairs()
-        pieces = [piece.name for piece in self.geometry.geometryObjects]
-        for second in range(len(pieces)):
-            for first in range(second):
-                if frozenset((pieces[first], pieces[second])) not in excluded:
-                    self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+        all_pairs = ((first, second) for second in range(len(pieces)) for first in range(second))
+        tested = [pair for pair in all_pairs if frozenset(pieces[k] for k in pair) not in excluded]
+        add_pairs(self.geometry, np.array(tested, dtype=np.intp).reshape(-1, 2))
         return (*excluded.values(), *drop_rigid_pairs(self.geometry))
 
     def _posture(self, item: Element) -> Callable[[Articulated], Array]:

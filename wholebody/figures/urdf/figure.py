@@ -19,15 +19,16 @@ import pinocchio as pin
 from wholebody.base.arrays import with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError
+from wholebody.figures.description import Law, led
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
-from wholebody.figures.model_check import along_z
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
 from wholebody.figures.urdf.file import UrdfFile, read_urdf
-from wholebody.figures.urdf.joints import Mimic, UrdfJoint
+from wholebody.figures.urdf.joints import UrdfJoint
 from wholebody.figures.urdf.srdf import read_srdf
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
+from wholebody.geometry.placement import along_z
 
 
 def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
@@ -69,30 +70,22 @@ def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, .
     notes = []
     for name, law in laws.items():
         own = by_name[name]
-        low, high = sorted((end - law.offset) / law.multiplier for end in (own.lower, own.upper))
-        kept = max(low, ends[law.joint][0]), min(high, ends[law.joint][1])
-        if kept[0] > kept[1] or (kept[0] == kept[1] and ends[law.joint][0] < ends[law.joint][1]):
+        low, high = sorted((end - law.offset) / law.slope for end in (own.lower, own.upper))
+        kept = max(low, ends[law.leader][0]), min(high, ends[law.leader][1])
+        if kept[0] > kept[1] or (kept[0] == kept[1] and ends[law.leader][0] < ends[law.leader][1]):
             # PR2's gripper: a multiplier of -1, and limits of one sign, as if it were 1
-            note = f"its limits leave {shown(law.joint)} no room, so they are left out"
+            note = f"its limits leave {shown(law.leader)} no room, so they are left out"
             notes.append(f"joint {shown(name)}: {note}")
             continue
-        ends[law.joint] = kept
+        ends[law.leader] = kept
     made = [with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints]
     return tuple(made), tuple(notes)
 
 
-def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, Mimic]:
+def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, Law]:
     """The law of every joint that follows another, directly or through others."""
-    by_name = {joint.name: joint for joint in joints}
-    laws: dict[str, Mimic] = {}
-    for joint in joints:
-        slope, offset, at = 1.0, 0.0, joint
-        while at.mimic is not None:
-            slope, offset = slope * at.mimic.multiplier, offset + slope * at.mimic.offset
-            at = by_name[at.mimic.joint]
-        if at is not joint:
-            laws[joint.name] = Mimic(at.name, slope, offset)
-    return laws
+    stated = {joint.name: joint.mimic for joint in joints if joint.mimic is not None}
+    return {name: led(stated, name) for name in stated}
 
 
 def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, ...], tuple[str, ...]]:
@@ -102,10 +95,11 @@ def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJ
     made, notes = [], []
     for joint in joints:
         law = laws.get(joint.name)
-        if law is None or (law.joint not in fixed and law.multiplier != 0.0):
+        if law is None or (law.leader not in fixed and law.slope != 0.0):
             made.append(joint)
             continue
-        notes.append(f"joint {shown(joint.name)}: it mimics {shown(law.joint)}, which does not move it, so it is fixed")
+        remark = f"it mimics {shown(law.leader)}, which does not move it, so it is fixed"
+        notes.append(f"joint {shown(joint.name)}: {remark}")
         if joint.kind == "prismatic":
             moved = pin.SE3(np.eye(3), law.offset * joint.axis)
         else:
@@ -118,25 +112,25 @@ def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> t
     """Make the first of joints that move together the leader; its limits are those of the file's leader."""
     laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
     first: dict[str, str] = {}
-    for name in sorted({*laws, *(law.joint for law in laws.values())}, key=order.__getitem__):
-        first.setdefault(laws[name].joint if name in laws else name, name)
+    for name in sorted({*laws, *(law.leader for law in laws.values())}, key=order.__getitem__):
+        first.setdefault(led(laws, name).leader, name)
     made = []
     for joint in joints:
-        law = laws.get(joint.name, Mimic(joint.name, 1.0, 0.0))
-        if law.joint not in first:
+        law = led(laws, joint.name)
+        if law.leader not in first:
             made.append(joint)
             continue
         # a revolute joint without limits would be a point on a circle, which no joint can follow
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
-        head = first[law.joint]
+        head = first[law.leader]
         if joint.name != head:
-            base = laws.get(head, Mimic(head, 1.0, 0.0))
-            slope = law.multiplier / base.multiplier
-            made.append(with_values(joint, kind=kind, mimic=Mimic(head, slope, law.offset - slope * base.offset)))
+            base = led(laws, head)
+            slope = law.slope / base.slope
+            made.append(with_values(joint, kind=kind, mimic=Law(head, slope, law.offset - slope * base.offset)))
             continue
-        leader = by_name[law.joint]
-        low, high = sorted(law.multiplier * end + law.offset for end in (leader.lower, leader.upper))
-        velocity = abs(law.multiplier) * leader.velocity
+        leader = by_name[law.leader]
+        low, high = sorted(law.slope * end + law.offset for end in (leader.lower, leader.upper))
+        velocity = abs(law.slope) * leader.velocity
         made.append(with_values(joint, kind=kind, mimic=None, lower=low, upper=high, velocity=velocity))
     return tuple(made)
 
@@ -163,7 +157,7 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
         made = add_joint(robot, *joint[:4], origin=joint.origin, axis=axis, limit=limit)
         if joint.mimic is not None:
             multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
-            SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
+            SubElement(made, "mimic", joint=joint.mimic.leader, multiplier=multiplier, offset=offset)
     return ElementTree.tostring(robot, encoding="unicode")
 
 

@@ -13,18 +13,11 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import with_values
 from wholebody.base.checks import UNLIMITED, shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError
+from wholebody.figures.description import Law
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-
-
-class Mimic(NamedTuple):
-    """A joint's value is that of another times `multiplier` plus `offset`."""
-
-    joint: str
-    multiplier: float
-    offset: float
 
 
 class UrdfJoint(NamedTuple):
@@ -40,7 +33,7 @@ class UrdfJoint(NamedTuple):
     upper: float  # inf without a limit
     velocity: float  # largest velocity, 1/s or m/s; inf if the file gives none
     effort: float  # largest torque or force; inf if the file gives none
-    mimic: Mimic | None  # the joint it follows
+    mimic: Law | None  # the joint it follows
 
 
 def read_joints(
@@ -64,8 +57,8 @@ def read_joints(
         joints.append(joint)
     names = {joint.name for joint in joints}
     for k, joint in enumerate(joints):
-        if joint.mimic is not None and joint.mimic.joint not in names:
-            note = f"it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is on its own"
+        if joint.mimic is not None and joint.mimic.leader not in names:
+            note = f"it mimics {shown(joint.mimic.leader)}, which is not in the file, so it is on its own"
             notes.append(f"joint {shown(joint.name)}: {note}")
             joints[k] = with_values(joint, mimic=None)
     _check_followers({joint.name: joint for joint in joints}, path)
@@ -144,13 +137,13 @@ def _most(limit: Element, what: str, place: str) -> float:
     return value
 
 
-def _mimic(element: Element, kind: str, place: str) -> Mimic | None:
+def _mimic(element: Element, kind: str, place: str) -> Law | None:
     mimic = element.find("mimic")
     # it has no effect on a fixed joint, which robots with locked hands have
     if mimic is None or kind not in ("revolute", "continuous", "prismatic"):
         return None
     multiplier = bounded(mimic, "multiplier", place, 1, "1")[0]
-    return Mimic(mimic.get("joint", ""), multiplier, bounded(mimic, "offset", place, 1, "0", LARGEST)[0])
+    return Law(mimic.get("joint", ""), multiplier, bounded(mimic, "offset", place, 1, "0", LARGEST)[0])
 
 
 def _check_followers(joints: dict[str, UrdfJoint], path: Path) -> None:
@@ -158,15 +151,15 @@ def _check_followers(joints: dict[str, UrdfJoint], path: Path) -> None:
         seen = [joint.name]
         while (mimic := joints[seen[-1]].mimic) is not None:
             place = f"{path}: joint {shown(seen[-1])}"
-            if joints[mimic.joint].kind in ("floating", "planar"):
+            if joints[mimic.leader].kind in ("floating", "planar"):
                 raise FileFormatError(
-                    f"{place} mimics {shown(mimic.joint)}, which is {joints[mimic.joint].kind}; name another"
+                    f"{place} mimics {shown(mimic.leader)}, which is {joints[mimic.leader].kind}; name another"
                 )
-            if mimic.joint in seen:
+            if mimic.leader in seen:
                 raise FileFormatError(
-                    f"{place} mimics {shown(mimic.joint)}, which mimics it in turn; let one of them be free"
+                    f"{place} mimics {shown(mimic.leader)}, which mimics it in turn; let one of them be free"
                 )
-            seen.append(mimic.joint)
+            seen.append(mimic.leader)
 
 
 def _root(links: tuple[str, ...], parent_of: dict[str, str], path: Path) -> str:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
-from wholebody.figures.description import ROOT_JOINT, ROUNDED, zero_within_limits
+from wholebody.figures.description import ROOT_JOINT, ROUNDED, follows, zero_within_limits
 from wholebody.figures.urdf.xml_reading import bounded, numbers, read_robot
 from wholebody.geometry.placement import FARTHEST
 
@@ -62,7 +62,7 @@ class _Reader:
         self._movable = {
             name: index
             for index, name in enumerate(model.names)
-            if index and model.joints[index].nv == 1 and model.joints[index].shortname() != "JointModelMimic"
+            if index and model.joints[index].nv == 1 and not follows(model.joints[index])
         }
 
     def joints(self, group: Element, inside: tuple[str, ...]) -> tuple[str, ...]:

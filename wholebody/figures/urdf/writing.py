@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-
-FOLLOWS = "JointModelMimic"  # Pinocchio's name of a joint that follows another
+from wholebody.figures.description import follows
 
 ANY_LIMIT = {"lower": -1.0, "upper": 1.0, "effort": 1.0, "velocity": 1.0}
 """A limit where a URDF must have one, for readers that get the real one elsewhere."""
@@ -30,14 +29,13 @@ def urdf_axis(model: pin.Model, index: int) -> UrdfAxis | None:
     """Kind and axis of a joint of a model, its own where it follows another; None if it has no single axis."""
     joint = model.joints[index]
     name = joint.shortname()
-    follows = name == FOLLOWS
     kind = _KINDS.get((name.removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
-    if kind is None and not follows:
+    if kind is None and not follows(joint):
         return None
     data = joint.createData()
     joint.calc(data, np.zeros(joint.idx_q + max(joint.nq, 2)))  # Pinocchio sets some axes only then
     motion = np.array(data.S).ravel()
-    if follows:
+    if follows(joint):
         motion = motion / joint.extract().scaling
         kind = "prismatic" if motion[:3].any() else "revolute"
     return UrdfAxis(str(kind), motion[:3] if kind == "prismatic" else motion[3:])

@@ -17,11 +17,11 @@ from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
 
-def read_xml(path: Path, kind: str) -> Element:
-    """Return the outermost element of an XML file of a kind, such as "URDF"."""
+def read_robot(path: Path, kind: str) -> Element:
+    """Return the `<robot>` of a "URDF" or an "SRDF"."""
     data = read_bytes(path, kind, 64 * 2**20)  # the largest that is accepted as a description of a robot
     try:
-        return ElementTree.fromstring(data)
+        robot = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
         if b"\0" in data or "\ufffd" in data.decode("utf-8", "replace"):
             raise FileFormatError(f"{path}: this is not a text file; give a {kind}") from None
@@ -31,11 +31,6 @@ def read_xml(path: Path, kind: str) -> Element:
             f"{path}: its encoding cannot be read ({one_line(str(error))}); save the file as UTF-8 and say so in its "
             "first line"
         ) from None
-
-
-def read_robot(path: Path, kind: str) -> Element:
-    """Return the `<robot>` of a "URDF" or an "SRDF"."""
-    robot = read_xml(path, kind)
     if robot.tag != "robot":
         mend = {"mujocoinclude": "load the MJCF file that includes it"}.get(robot.tag, f"give a robot's {kind}")
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; {mend}")

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import title_of
+from wholebody.figures.description import follows
 from wholebody.figures.figure import Figure
 from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.clip import MOST_FRAMES
@@ -242,7 +243,7 @@ def own(animated: Animated, figure: Figure) -> Frames | None:
         if document.names[document.parents[node]] != JOINT + model.names[model.parents[joint]]:
             return None
         parts = animated.moved.get(node) or tuple(np.tile(part, (animated.count, 1)) for part in document.parts(node))
-        if made.shortname() == "JointModelMimic":
+        if follows(made):
             continue
         fixed = model.jointPlacements[joint]
         turned = Rotation.from_matrix(fixed.rotation.T) * Rotation.from_quat(parts[1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -38,8 +38,23 @@ class Surface(NamedTuple):
     friction: float
 
 
+def _surface(pair: object, what: str) -> Surface:
+    restitution, friction = checks.numbers(pair, (2,), f"{what}: (restitution, friction)").tolist()
+    # Greatest coefficient of friction; rubber on dry concrete has about 1.
+    return Surface(
+        checks.number(restitution, f"{what}: restitution", 0.0, 1.0),
+        checks.number(friction, f"{what}: friction", 0.0, 10.0),
+    )
+
+
+def _surfaces(value: object, what: str) -> Mapping[str, Surface]:
+    checks.instance(value, Mapping, what, "give a dictionary such as {'wood': (0.3, 0.3)}")
+    found = {checks.text(name, f"{what}: a name"): _surface(pair, f"{what}: {name!r}") for name, pair in value.items()}  # type: ignore[attr-defined]
+    return MappingProxyType(found)
+
+
 @dataclass(frozen=True)
-class Material:
+class Material(Checked):
     """A material by its name, and what happens where it touches others.
 
     Attributes:
@@ -54,36 +69,12 @@ class Material:
         >>> rubber = wb.dynamics.Material("rubber", others=(0.6, 0.9))  # restitution, friction
     """
 
-    name: str
-    against: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    others: tuple[float, float] | None = None
-
-    def __post_init__(self) -> None:
-        checks.text(self.name, "the name of a material")
-        if not isinstance(self.against, Mapping):
-            raise InputError(
-                f"material {self.name!r}: against is {checks.shown(self.against)}; give a dictionary such as "
-                "{'wood': (0.3, 0.3)}"
-            )
-        found = {}
-        for other, pair in self.against.items():
-            checks.text(other, f"material {self.name!r}: the name of another material")
-            found[other] = _surface(pair, f"material {self.name!r} against {other!r}")
-        object.__setattr__(self, "against", MappingProxyType(found))
-        if self.others is not None:
-            object.__setattr__(self, "others", _surface(self.others, f"material {self.name!r} against others"))
+    name: Annotated[str, checks.text]
+    against: Annotated[Mapping[str, tuple[float, float]], _surfaces] = field(default_factory=dict)
+    others: Annotated[tuple[float, float], _surface] | None = None
 
     def __reduce__(self) -> tuple[object, ...]:
         return Material, (self.name, {other: tuple(pair) for other, pair in self.against.items()}, self.others)
-
-
-def _surface(pair: object, what: str) -> Surface:
-    values = checks.numbers(pair, (2,), f"{what}: (restitution, friction)")
-    # Greatest coefficient of friction; rubber on dry concrete has about 1.
-    return Surface(
-        checks.number(float(values[0]), f"{what}: restitution", 0.0, 1.0),
-        checks.number(float(values[1]), f"{what}: friction", 0.0, 10.0),
-    )
 
 
 MATERIALS: Mapping[str, Material] = MappingProxyType(
@@ -238,17 +229,7 @@ def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassPrope
 def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
     if isinstance(shape, HalfSpace):
         raise InputError(f"{name!r} is a half-space, which has no finite mass and cannot move; leave its body out")
-    if isinstance(shape, Box):
-        return pin.Inertia.FromBox(float(np.prod(shape.size)), *shape.size), ""
-    if isinstance(shape, Sphere):
-        return pin.Inertia.FromSphere(4.0 / 3.0 * np.pi * shape.radius**3, shape.radius), ""
-    if isinstance(shape, Ellipsoid):
-        axes = shape.semi_axes
-        return pin.Inertia.FromEllipsoid(4.0 / 3.0 * np.pi * float(np.prod(axes)), *axes), ""
-    if isinstance(shape, Capsule):
-        volume = np.pi * shape.radius**2 * (shape.length + 4.0 / 3.0 * shape.radius)
-        return pin.Inertia.FromCapsule(volume, shape.radius, shape.length), ""
-    if isinstance(shape, Cylinder):
+    if isinstance(shape, Cylinder):  # whose piece is a prism
         volume = np.pi * shape.radius**2 * shape.length
         return pin.Inertia.FromCylinder(volume, shape.radius, shape.length), ""
     if isinstance(shape, Torus):
@@ -256,21 +237,20 @@ def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
     if isinstance(shape, Compound):
         made = [(at.act(found), note) for part, at in shape.parts for found, note in (_of_density_one(part, name),)]
         return sum((found for found, _ in made), pin.Inertia.Zero()), next((note for _, note in made if note), "")
-    import trimesh
-
     if isinstance(shape, Mesh):
+        import trimesh
+
         mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=True)
         if mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0:
-            return _of_mesh(mesh), ""
-    elif isinstance(shape, Hull):
-        return _of_mesh(trimesh.convex.convex_hull(shape.points)), ""
-    total = pin.Inertia.Zero()
-    for piece in shape.pieces():
-        if not np.isfinite(piece.volume):
+            found = mesh.mass_properties
+            return pin.Inertia(float(found["mass"]), np.array(found["center_mass"]), np.array(found["inertia"])), ""
+    total, exact = pin.Inertia.Zero(), isinstance(shape, (Box, Capsule, Ellipsoid, Hull, Sphere))
+    for solid, placement, volume in shape.pieces():
+        if not np.isfinite(volume):
             raise InputError(f"{name!r} has a piece without a finite volume and cannot move; leave its body out")
-        hull = trimesh.convex.convex_hull(np.array(piece.geometry.points()))
-        total = total + piece.placement.act(_of_mesh(hull))
-    return total, f"{name!r} is no closed mesh: its mass is that of its convex pieces"
+        centre, inertia = np.array(solid.computeCOM()), np.array(solid.computeMomentofInertiaRelatedToCOM())
+        total = total + placement.act(pin.Inertia(volume, centre, inertia))
+    return total, "" if exact else f"{name!r} is no closed mesh: its mass is that of its convex pieces"
 
 
 def _of_torus(shape: Torus) -> pin.Inertia:
@@ -279,8 +259,3 @@ def _of_torus(shape: Torus) -> pin.Inertia:
     mass = 2.0 * np.pi**2 * shape.radius * small
     moments = (0.5 * big + 0.625 * small, 0.5 * big + 0.625 * small, big + 0.75 * small)
     return pin.Inertia(mass, np.zeros(3), mass * np.diag(moments))
-
-
-def _of_mesh(mesh: Any) -> pin.Inertia:
-    found = mesh.mass_properties
-    return pin.Inertia(float(found["mass"]), np.array(found["center_mass"]), np.array(found["inertia"]))

@@ -13,8 +13,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import shape_of
+from wholebody.figures.description import follows
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, exact, urdf_axis
+from wholebody.figures.urdf.writing import UrdfAxis, exact, urdf_axis
 from wholebody.geometry.flesh import settled
 from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import Place
@@ -41,7 +42,7 @@ def own_frame(figure: Figure, name: str) -> tuple[int, pin.SE3]:
 def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
     """Kind and axis of a joint of one axis; InputError for another, whose sentence `written_for` ends."""
     known, kind = urdf_axis(model, index), model.joints[index].shortname()
-    if known is None or kind == FOLLOWS:
+    if known is None or follows(model.joints[index]):
         raise InputError(f"joint {model.names[index]!r} is a {kind}; {written_for}")
     return known
 
