@@ -9,8 +9,6 @@ Both are done by the program of the method "trajectory", begun at the method's p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wholebody.base.arrays import Array
@@ -22,31 +20,18 @@ from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
 
-@dataclass(frozen=True)
-class RepairSettings:
-    """Numbers of the repair."""
-
-    margin: float = 0.1  # seconds before and after a fault in which postures may change; doubled in each round
-    rounds: int = 4  # of looking at the clip and repairing what is wrong
-    radius: float = 0.05  # trust region, radians and metres; postures are nearly free
-    through: float = 0.06  # metres, as thick as a forearm; no rows free a deeper dip, of a limb that goes right through
-    spread: float = 0.06  # seconds that a push at one frame spreads over
-
-
-SETTINGS = RepairSettings()
-
-
 def repaired(run: Run, q: Array) -> Array:
     """Postures (n, nq) with less that is wrong than in q, which stay but near faults and beside what is passed."""
     q = one_sided(run, np.array(q))
-    for number in range(SETTINGS.rounds):
+    for number in range(4):
         found = run.faults(q)
-        deep = SHALLOW if number else SETTINGS.through  # what rows cannot free, and later what they did not free
+        # m: no rows free a deeper dip, of a limb that goes right through a forearm; later what they did not free
+        deep = SHALLOW if number else 0.06
         changed = [_kept_back(run, q, gap, deep) for gap in found.gaps]
         if run.ended:
             return q
         found = run.faults(q) if any(changed) else found
-        for window in run.windows(found.frames, SETTINGS.margin * 2**number, 2):
+        for window in run.windows(found.frames, 0.1 * 2**number, 2):  # s beside a fault in which postures may change
             if run.watch.tell(1.0, f"frames {window.first} to {window.end - 1} are repaired"):
                 return q
             changed.append(_repair(run, window, found, q))
@@ -66,7 +51,8 @@ def _kept_back(run: Run, q: Array, gap: int, deep: float) -> bool:
 def _repair(run: Run, window: Window, found: Faults, q: Array) -> bool:
     """Repair one window of q (n, nq) in place; whether it is better than before."""
     frames = slice(window.first, window.end)
-    windows = ClipRun(run, q, SETTINGS.spread, None, near=SETTINGS.radius)
+    # s that a push at one frame spreads over; rad and m of the trust region, in which postures are nearly free
+    windows = ClipRun(run, q, 0.06, None, near=0.05)
     freed = windows.window(window, found, lambda _: run.ended, q).q
     before = int(found.wrong[frames].sum()) + sum(window.first <= gap < window.end - 1 for gap in found.gaps)
     better = run.faults(freed, window.first).number < before
