@@ -150,8 +150,7 @@ def least_separation(
     # Zero where nothing overlaps, and with ``separated=False`` where nothing separates (between two half-spaces).
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
-    translations = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
-    best = min(translations, key=lambda way: float(way @ way), default=None)
+    best = min(escapes, key=lambda way: float(way @ way), default=None)
     least = False
     if not pairs.sampled:
         best, least = _search(pairs, best)
@@ -165,13 +164,10 @@ def least_separation(
     return Separation(best, not pairs.overlapping(best, OVERLAP)[0], least)
 
 
-_ROOT = _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0))
-
-
 def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
     """Branch and bound: the best translation without overlap, and whether it is proven to be the least."""
     limit = np.inf if best is None else float(best @ best)
-    queue: list[tuple[float, int, _Node]] = [(0.0, 0, _ROOT)]
+    queue = [(0.0, 0, _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0)))]
     made = 0
     # Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof.
     for _ in range(400):
@@ -187,19 +183,6 @@ def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
                 made += 1
                 heapq.heappush(queue, (value, made, child))
     return best, False
-
-
-def _depth_first(pairs: ObjectPair, node: _Node) -> Array | None:
-    """Follow the nearest child down to a translation without overlap."""
-    for _ in range(10 * (len(pairs.a) + len(pairs.b))):
-        found, depths, normals = pairs.overlapping(node.translation, TOUCHING)
-        if not found:
-            return node.translation
-        children = _children(pairs, node, found, depths, normals)
-        if not children:
-            return None
-        node = min(children, key=lambda child: float(child.translation @ child.translation))
-    return None
 
 
 def _children(

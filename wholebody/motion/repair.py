@@ -13,21 +13,22 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
-from wholebody.motion.faults import Faults, dip_depth
+from wholebody.motion.faults import Faults, depths_between
 from wholebody.motion.measures import MotionBounds, excess
-from wholebody.motion.one_side import SHALLOW, keep_back, one_sided
+from wholebody.motion.one_side import keep_back
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
 
 def repaired(run: Run, q: Array) -> Array:
     """Postures (n, nq) with less that is wrong than in q, which stay but near faults and beside what is passed."""
-    q = one_sided(run, np.array(q))
+    q = np.array(q)
+    for gap, deep in depths_between(run.workspace, q, range(len(q) - 1)).items():
+        if deep > 0.01:  # m: it passes through something, from which no rows bring it back; less changes more frames
+            _kept_back(run, q, gap)
     for number in range(4):
         found = run.faults(q)
-        # m: no rows free a deeper dip, of a limb that goes right through a forearm; later what they did not free
-        deep = SHALLOW if number else 0.06
-        changed = [_kept_back(run, q, gap, deep) for gap in found.gaps]
+        changed = [_kept_back(run, q, gap) for gap in found.gaps if number]  # what rows did not free
         if run.ended:
             return q
         found = run.faults(q) if any(changed) else found
@@ -40,12 +41,10 @@ def repaired(run: Run, q: Array) -> Array:
     return q
 
 
-def _kept_back(run: Run, q: Array, gap: int, deep: float) -> bool:
-    """Keep frames beside a gap that is deeper on one side of what it passes, in place; whether that succeeded."""
-    if run.ended or dip_depth(run.workspace, q[gap], q[gap + 1]) <= deep:
-        return False
+def _kept_back(run: Run, q: Array, gap: int) -> bool:
+    """Keep frames beside a gap on one side of what it passes, in place; whether there was any, and that succeeded."""
     note = f"what passes after frame {gap} is kept on one side"
-    return keep_back(run, q, gap, len(q), cancelled=lambda: run.watch.tell(1.0, note))
+    return not run.ended and keep_back(run, q, gap, cancelled=lambda: run.watch.tell(1.0, note))
 
 
 def _repair(run: Run, window: Window, found: Faults, q: Array) -> bool:
