@@ -132,8 +132,8 @@ class Separation(NamedTuple):
 
     translation: Array  # (3,) metres
     separated: bool  # whether coal finds no overlap after it
-    # whether no shorter one exists, proven. With several overlapping pairs of round pieces, whose sides are sampled and
-    # then refined, there is seldom a proof: then the translation is the best of many local searches.
+    # whether no shorter one exists, proven. Of round pieces, whose sides are not enumerated, there is seldom a proof:
+    # then the translation is the best of many local searches.
     least: bool
 
 
@@ -152,7 +152,7 @@ def least_separation(
     escapes = pairs.escapes()
     best = min(escapes, key=lambda way: float(way @ way), default=None)
     least = False
-    if not pairs.sampled:
+    if pairs.enumerable:
         best, least = _search(pairs, best)
     if best is not None and not least:
         best = _descents(pairs, best, escapes)
@@ -174,10 +174,10 @@ def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
         if not queue:
             return best, best is not None
         _, _, node = heapq.heappop(queue)
-        found, depths, normals = pairs.overlapping(node.translation, TOUCHING)
+        found, depths, _ = pairs.overlapping(node.translation, TOUCHING)
         if not found:
             return node.translation, True
-        for child in _children(pairs, node, found, depths, normals):
+        for child in _children(pairs, node, found[int(np.argmax(depths))]):
             value = float(child.translation @ child.translation)
             if value < limit:
                 made += 1
@@ -185,16 +185,9 @@ def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
     return best, False
 
 
-def _children(
-    pairs: ObjectPair, node: _Node, found: list[tuple[int, int]], depths: Array, normals: Array
-) -> list[_Node]:
+def _children(pairs: ObjectPair, node: _Node, deepest: tuple[int, int]) -> list[_Node]:
     """One node for each side of the deepest pair that can be reached with the sides already chosen."""
-    deepest = int(np.argmax(depths))
-    i, j = found[deepest]
-    sides = pairs.sides(i, j)
-    if pairs.a[i].round or pairs.b[j].round:
-        here = pairs.rows(i, j, normals[deepest : deepest + 1])
-        sides = Sides(np.vstack([sides.normals, here.normals]), np.concatenate([sides.offsets, here.offsets]))
+    sides = pairs.sides(*deepest)
     answers = _nearest_on_rows(sides, node.normals, node.offsets)
     return [
         _Node(answer, np.vstack([node.normals, normal]), np.append(node.offsets, offset))
