@@ -21,7 +21,7 @@ from wholebody.geometry.pieces import COAL_ACCURACY, SweptPoints, normal_across,
 Placed: TypeAlias = tuple[Any, pin.SE3]  # a coal geometry and its placement in the world
 
 MOST_POINTS = 20_000
-"""Number of vertices of a Minkowski difference above which its sides are sampled instead of enumerated."""
+"""Number of vertices of a Minkowski difference up to which its sides are enumerated."""
 
 
 OVERLAP = 2.0 * COAL_ACCURACY  # depth up to which a pair counts as touching, metres: twice coal's own tolerance
@@ -80,7 +80,7 @@ class ObjectPair:
         self._at_a = [_transform(x.placement) for x in self.a]
         self._at_b = [_transform(x.placement) for x in self.b]
         most = max(len(x.points) for x in self.a) * max(len(x.points) for x in self.b)
-        self.sampled = most > MOST_POINTS or any(x.round for x in (*self.a, *self.b))
+        self.enumerable = most <= MOST_POINTS and not any(x.round for x in (*self.a, *self.b))
 
     def overlapping(self, translation: Array, tolerance: float) -> tuple[list[tuple[int, int]], Array, Array]:
         """Pairs deeper than `tolerance`: (i, j), depths (k,), and normals (k, 3) out of B into A."""
@@ -126,7 +126,7 @@ class ObjectPair:
         return Sides(np.array(normals), np.array(offsets)) if normals else None
 
     def sides(self, i: int, j: int) -> Sides:
-        """Every side of O_ij if it is a polytope, a sample of sides if it is round."""
+        """Every side of O_ij, a polytope or a half-space."""
         if (i, j) not in self._sides:
             self._sides[i, j] = self.rows(i, j, self._normals(self.a[i], self.b[j]))
         return self._sides[i, j]
@@ -138,22 +138,13 @@ class ObjectPair:
         return Sides(normals[finite], offsets[finite])
 
     def _normals(self, a: _Body, b: _Body) -> Array:
-        from scipy.spatial import ConvexHull, QhullError
+        from scipy.spatial import ConvexHull
 
         if a.plane is not None or b.plane is not None:
             return np.array([side for side in (b.plane, None if a.plane is None else -a.plane) if side is not None])
-        many = len(a.points) * len(b.points) > MOST_POINTS
-        found = [_net()] if a.round or b.round or many else []
-        if len(a.points) and len(b.points) and not many:
-            corners = (b.points[:, None] - a.points).reshape(-1, 3)
-            try:
-                found.append(ConvexHull(corners - corners.mean(axis=0)).equations[:, :3])
-            except QhullError:  # the difference is a point, a segment or flat: the radius decides
-                crossed = np.cross(a.axis, b.axis)
-                if np.linalg.norm(crossed) > 1e-9:
-                    found.append(np.array([crossed, -crossed]) / np.linalg.norm(crossed))
-        normals = np.vstack(found)
-        return normals[np.unique(np.round(normals, 9), axis=0, return_index=True)[1]]
+        corners = (b.points[:, None] - a.points).reshape(-1, 3)
+        normals = ConvexHull(corners - corners.mean(axis=0)).equations[:, :3]
+        return np.asarray(normals[np.unique(np.round(normals, 9), axis=0, return_index=True)[1]])
 
     def escapes(self) -> Array:
         """Translations (k, 3) that move the hull of A out of that of B, one for each of many directions."""

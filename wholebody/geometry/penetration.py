@@ -132,8 +132,8 @@ class Separation(NamedTuple):
 
     translation: Array  # (3,) metres
     separated: bool  # whether coal finds no overlap after it
-    # whether no shorter one exists, proven. With several overlapping pairs of round pieces, whose sides are sampled and
-    # then refined, there is seldom a proof: then the translation is the best of many local searches.
+    # whether no shorter one exists, proven. Of round pieces, whose sides are not enumerated, there is seldom a proof:
+    # then the translation is the best of many local searches.
     least: bool
 
 
@@ -150,10 +150,9 @@ def least_separation(
     # Zero where nothing overlaps, and with ``separated=False`` where nothing separates (between two half-spaces).
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
-    translations = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
-    best = min(translations, key=lambda way: float(way @ way), default=None)
+    best = min(escapes, key=lambda way: float(way @ way), default=None)
     least = False
-    if not pairs.sampled:
+    if pairs.enumerable:
         best, least = _search(pairs, best)
     if best is not None and not least:
         best = _descents(pairs, best, escapes)
@@ -165,23 +164,20 @@ def least_separation(
     return Separation(best, not pairs.overlapping(best, OVERLAP)[0], least)
 
 
-_ROOT = _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0))
-
-
 def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
     """Branch and bound: the best translation without overlap, and whether it is proven to be the least."""
     limit = np.inf if best is None else float(best @ best)
-    queue: list[tuple[float, int, _Node]] = [(0.0, 0, _ROOT)]
+    queue = [(0.0, 0, _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0)))]
     made = 0
     # Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof.
     for _ in range(400):
         if not queue:
             return best, best is not None
         _, _, node = heapq.heappop(queue)
-        found, depths, normals = pairs.overlapping(node.translation, TOUCHING)
+        found, depths, _ = pairs.overlapping(node.translation, TOUCHING)
         if not found:
             return node.translation, True
-        for child in _children(pairs, node, found, depths, normals):
+        for child in _children(pairs, node, found[int(np.argmax(depths))]):
             value = float(child.translation @ child.translation)
             if value < limit:
                 made += 1
@@ -189,29 +185,9 @@ def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
     return best, False
 
 
-def _depth_first(pairs: ObjectPair, node: _Node) -> Array | None:
-    """Follow the nearest child down to a translation without overlap."""
-    for _ in range(10 * (len(pairs.a) + len(pairs.b))):
-        found, depths, normals = pairs.overlapping(node.translation, TOUCHING)
-        if not found:
-            return node.translation
-        children = _children(pairs, node, found, depths, normals)
-        if not children:
-            return None
-        node = min(children, key=lambda child: float(child.translation @ child.translation))
-    return None
-
-
-def _children(
-    pairs: ObjectPair, node: _Node, found: list[tuple[int, int]], depths: Array, normals: Array
-) -> list[_Node]:
+def _children(pairs: ObjectPair, node: _Node, deepest: tuple[int, int]) -> list[_Node]:
     """One node for each side of the deepest pair that can be reached with the sides already chosen."""
-    deepest = int(np.argmax(depths))
-    i, j = found[deepest]
-    sides = pairs.sides(i, j)
-    if pairs.a[i].round or pairs.b[j].round:
-        here = pairs.rows(i, j, normals[deepest : deepest + 1])
-        sides = Sides(np.vstack([sides.normals, here.normals]), np.concatenate([sides.offsets, here.offsets]))
+    sides = pairs.sides(*deepest)
     answers = _nearest_on_rows(sides, node.normals, node.offsets)
     return [
         _Node(answer, np.vstack([node.normals, normal]), np.append(node.offsets, offset))

@@ -92,14 +92,14 @@ class Follower:
         self._goal = Posture(terms.q[0]).resolve(terms.scene, q)
         self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
 
-    def frame(self, number: int, q: Array, *, goal: Array | None = None) -> Array:
-        """The posture (nq,) of a frame, after three steps at most, towards `goal`."""
+    def frame(self, number: int, q: Array) -> Array:
+        """The posture (nq,) of a frame, after three steps at most from q (nq,) towards the original one."""
         terms, problem = self._terms, self._problem
         if terms.kept(number):
             return np.array(terms.q[number])
         problem.clearances = np.full_like(problem.clearances, self._clearance)
         q = terms.within(number, q)
-        target = terms.q[number] if goal is None else goal
+        target = terms.q[number]
         near = filled(self._goal, target=target, resolved_target=target)
         held = terms.held(number)
         problem.goals = (near, *(term for term in held if isinstance(term, Goal)))

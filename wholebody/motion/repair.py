@@ -9,44 +9,30 @@ Both are done by the program of the method "trajectory", begun at the method's p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run
-from wholebody.motion.faults import Faults, dip_depth
+from wholebody.motion.faults import Faults, depths_between
 from wholebody.motion.measures import MotionBounds, excess
-from wholebody.motion.one_side import SHALLOW, keep_back, one_sided
+from wholebody.motion.one_side import keep_back
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
 
-@dataclass(frozen=True)
-class RepairSettings:
-    """Numbers of the repair."""
-
-    margin: float = 0.1  # seconds before and after a fault in which postures may change; doubled in each round
-    rounds: int = 4  # of looking at the clip and repairing what is wrong
-    radius: float = 0.05  # trust region, radians and metres; postures are nearly free
-    through: float = 0.06  # metres, as thick as a forearm; no rows free a deeper dip, of a limb that goes right through
-    spread: float = 0.06  # seconds that a push at one frame spreads over
-
-
-SETTINGS = RepairSettings()
-
-
 def repaired(run: Run, q: Array) -> Array:
     """Postures (n, nq) with less that is wrong than in q, which stay but near faults and beside what is passed."""
-    q = one_sided(run, np.array(q))
-    for number in range(SETTINGS.rounds):
+    q = np.array(q)
+    for gap, deep in depths_between(run.workspace, q, range(len(q) - 1)).items():
+        if deep > 0.01:  # m: it passes through something, from which no rows bring it back; less changes more frames
+            _kept_back(run, q, gap)
+    for number in range(4):
         found = run.faults(q)
-        deep = SHALLOW if number else SETTINGS.through  # what rows cannot free, and later what they did not free
-        changed = [_kept_back(run, q, gap, deep) for gap in found.gaps]
+        changed = [_kept_back(run, q, gap) for gap in found.gaps if number]  # what rows did not free
         if run.ended:
             return q
         found = run.faults(q) if any(changed) else found
-        for window in run.windows(found.frames, SETTINGS.margin * 2**number, 2):
+        for window in run.windows(found.frames, 0.1 * 2**number, 2):  # s beside a fault in which postures may change
             if run.watch.tell(1.0, f"frames {window.first} to {window.end - 1} are repaired"):
                 return q
             changed.append(_repair(run, window, found, q))
@@ -55,18 +41,17 @@ def repaired(run: Run, q: Array) -> Array:
     return q
 
 
-def _kept_back(run: Run, q: Array, gap: int, deep: float) -> bool:
-    """Keep frames beside a gap that is deeper on one side of what it passes, in place; whether that succeeded."""
-    if run.ended or dip_depth(run.workspace, q[gap], q[gap + 1]) <= deep:
-        return False
+def _kept_back(run: Run, q: Array, gap: int) -> bool:
+    """Keep frames beside a gap on one side of what it passes, in place; whether there was any, and that succeeded."""
     note = f"what passes after frame {gap} is kept on one side"
-    return keep_back(run, q, gap, len(q), cancelled=lambda: run.watch.tell(1.0, note))
+    return not run.ended and keep_back(run, q, gap, cancelled=lambda: run.watch.tell(1.0, note))
 
 
 def _repair(run: Run, window: Window, found: Faults, q: Array) -> bool:
     """Repair one window of q (n, nq) in place; whether it is better than before."""
     frames = slice(window.first, window.end)
-    windows = ClipRun(run, q, SETTINGS.spread, None, near=SETTINGS.radius)
+    # s that a push at one frame spreads over; rad and m of the trust region, in which postures are nearly free
+    windows = ClipRun(run, q, 0.06, None, near=0.05)
     freed = windows.window(window, found, lambda _: run.ended, q).q
     before = int(found.wrong[frames].sum()) + sum(window.first <= gap < window.end - 1 for gap in found.gaps)
     better = run.faults(freed, window.first).number < before

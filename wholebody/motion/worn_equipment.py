@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import coal
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, brief
 from wholebody.base.checks import choice, color, instance, known, listed, numbers, shown, text
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked
 from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
@@ -26,8 +27,16 @@ from wholebody.scene.scene import Scene
 Side = Literal["front", "back", "left", "right"]
 
 
+def _shape(value: Any, what: str) -> Shape:
+    return instance(value, Shape, what, "give wb.Mesh('pack.obj'), wb.Box or another")
+
+
+def _segments(value: Any, what: str) -> tuple[str, ...]:
+    return tuple(text(name, what) for name in listed(value, what, "['thorax']"))
+
+
 @dataclass(frozen=True, eq=False)
-class Equipment:
+class Equipment(Checked):
     """A solid on a segment of a figure.
 
     `attach` puts it into a scene as it is: its exact shape moves with the segment and is tested against all others but
@@ -51,27 +60,15 @@ class Equipment:
         >>> pack = wb.motion.Equipment("pack", wb.Box((0.15, 0.3, 0.4)), to="thorax", at=(-0.25, 0.0, 0.0))
     """
 
-    name: str
-    shape: Shape
-    to: str
-    at: PlacementLike = (0.0, 0.0, 0.0)
-    rests_on: tuple[str, ...] = ()
-    color: tuple[float, float, float, float] | None = None
+    name: Annotated[str, text]
+    shape: Annotated[Shape, _shape]
+    to: Annotated[str, text]
+    at: Annotated[PlacementLike, placement] = (0.0, 0.0, 0.0)
+    rests_on: Annotated[tuple[str, ...], _segments] = ()
+    color: Annotated[tuple[float, float, float, float], color] | None = None
     filling: SphereFilling | None = field(default=None, init=False)
 
     __repr__ = brief
-
-    def __post_init__(self) -> None:
-        where = f"Equipment {text(self.name, 'Equipment: name')!r}"
-        instance(self.shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
-        text(self.to, f"{where}: to")
-        object.__setattr__(self, "at", placement(self.at, f"{where}: at"))
-        rests = tuple(
-            text(name, f"{where}: rests_on") for name in listed(self.rests_on, f"{where}: rests_on", "['thorax']")
-        )
-        object.__setattr__(self, "rests_on", rests)
-        if self.color is not None:
-            object.__setattr__(self, "color", color(self.color, f"{where}: color"))
 
     @classmethod
     def worn(
@@ -105,7 +102,7 @@ class Equipment:
         """
         where = f"Equipment {text(name, 'Equipment: name')!r}"
         instance(figure, Figure, f"{where}: figure", "load one with wb.load('human')")
-        instance(shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
+        _shape(shape, f"{where}: shape")
         known(to, figure.segments, "segment", f"{where}: to")
         outward = np.array(
             {"front": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "right": (0.0, -1.0, 0.0)}[

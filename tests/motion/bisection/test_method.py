@@ -7,15 +7,13 @@ import signal
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.optimize import minimize
 
 import wholebody as wb
-from tests.freeing import Found, begun, freed_by
+from tests.freeing import Found, freed_by
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
@@ -23,7 +21,7 @@ from wholebody.methods.control import Progress
 from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import AvoidProgress, Run, Watch
 from wholebody.motion.bisection import method as method_module
-from wholebody.motion.bisection.method import Bisection, hold_between
+from wholebody.motion.bisection.method import Bisection
 from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import frame_terms
@@ -152,7 +150,7 @@ def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figu
     with scene.borrow() as workspace:
         method = QP(restarts=0, iterations=50)
         run = Run(Clip(person, terms.q, 1 / 30), terms, workspace, 0.0, Watch(None))
-        found = Predictor(run, method, 0.005).predict(4, q)
+        found = Predictor(run, method, 0.005).predict(4, q, [])
     assert found.good
     assert depths(scene, found.q[None])[0] <= 5e-5
     state = scene.state(found.q)
@@ -241,31 +239,6 @@ def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(human: Fig
             left, right = (state.frame(human.frame_id(f"{side}_palm")).copy() for side in ("left", "right"))
             places.append((right.inverse() * left).translation)
         assert np.linalg.norm(places[0] - places[1]) < 1e-3
-
-
-def test_interpolated_frames_move_to_the_nearest_posture_of_what_is_held(planar_arm: Callable[..., Figure]) -> None:
-    """An arm whose tip is held, at postures between which the tip leaves its place."""
-    figure = planar_arm(LENGTHS, radius=0.02)
-    scene = wb.Scene(figure)
-    clip = Clip(figure, np.repeat([[0.3, 0.8, -0.5]], 5, axis=0), 1 / 30)
-    place = scene.state(clip.q[0]).frame(figure.frame_id("tip")).translation.copy()
-    moved = clip.q + np.outer([0.0, 0.05, 0.1, 0.05, 0.0], [1.0, 0.6, 1.0])
-    with begun(clip, scene, [wb.Hold("tip", orientation=False)]) as run:
-        present = SimpleNamespace(q=moved.copy())
-        hold_between(present, Predictor(run, QP(restarts=0), 0.01))  # type: ignore[arg-type]
-    assert np.array_equal(present.q[[0, 4]], moved[[0, 4]])
-
-    def off(q: Array) -> Array:
-        """How far the tip is from its place, by trigonometry."""
-        angles = np.cumsum(q)
-        return np.array([np.array(LENGTHS) @ np.cos(angles), np.array(LENGTHS) @ np.sin(angles)]) - place[:2]
-
-    for before, after in zip(moved[1:4], present.q[1:4], strict=True):
-        assert np.linalg.norm(off(before)) > 0.02
-        assert np.linalg.norm(off(after)) < 2e-4
-        held = {"type": "eq", "fun": off}
-        nearest = minimize(lambda q, near=before: float((q - near) @ (q - near)), clip.q[0], constraints=held)
-        np.testing.assert_allclose(after, nearest.x, atol=2e-3)
 
 
 def test_the_ends_of_the_clip_are_freed(swing: Clip) -> None:

@@ -124,7 +124,7 @@ PROFILE = ["# comment", "0.1", "2", "\t".join(["0"] * 55), "\t".join(["0"] * 55)
         (2, "3", r"line 5: 2 rows and not 3"),
         (2, "two", r"line 3: 'two' is no number of frames"),
         (3, "0\t1", r"line 4: 2 values and not 55"),
-        (4, "\t".join(["0"] * 54 + ["nan"]), r"line 5: value 55 is nan"),
+        (4, "\t".join(["0"] * 54 + ["nan"]), r"line 5: Q49 is nan"),
     ],
 )
 def test_a_wrong_joint_profile_names_its_line(

@@ -67,7 +67,6 @@ class LinkFinder:
         for joint in range(1, workspace.model.njoints):
             if joint not in limbs.node_of and (joint in foreign or self._own[int(workspace.model.parents[joint])] < 0):
                 self._own[joint] = -1
-        self._paths = [frozenset(path) for path in limbs.paths]
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
     def link(self, overlaps: Sequence[Overlap], deepest: bool) -> Link | None:
@@ -97,11 +96,8 @@ class LinkFinder:
         for is_a in (True, False) if self._own[overlap.joint_a] >= self._own[overlap.joint_b] else (False, True):
             mine, other = (overlap.joint_a, overlap.joint_b) if is_a else (overlap.joint_b, overlap.joint_a)
             node, under = self._own[mine], self._carrier[other]
-            if node >= 0:
-                common = self._paths[under] if under >= 0 else frozenset()
-                nodes = tuple(k for k in self._limbs.paths[node] if k not in common)
-                if nodes:
-                    return _Side(overlap, node, is_a, nodes)
+            if node >= 0 and (nodes := self._limbs.between(under, node)):
+                return _Side(overlap, node, is_a, nodes)
         return None
 
     def _push(self, overlaps: Sequence[tuple[Overlap, bool]]) -> Vector:

@@ -103,7 +103,6 @@ class Bisection(Checked):
             recursion.free(self._points(figure, run.terms.q, frozen), whole=frozen == choices[-1])
             if frozen == choices[-1] or run.ended or not recursion.stuck:
                 break
-        hold_between(recursion, predictor)
         return MethodResult(recursion.q, repair=True, frozen=frozen)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
@@ -234,24 +233,6 @@ class Recursion:
                     self.q[frame, values] = original[frame, values]
                 self.q[frame] = self._run.terms.within(frame, self.q[frame])
                 self.bad[frame] = not self._predictor.free(self.q[frame])
-
-
-def hold_between(recursion: Recursion, predictor: Predictor) -> None:
-    """Move interpolated frames to the nearest posture in which everything holds, in place, where one is found."""
-    run = predictor.run
-    changed = np.flatnonzero((run.terms.q != recursion.q).any(axis=1)).tolist()
-    for done, frame in enumerate(changed):
-        q = recursion.q[frame]
-        if predictor.holds(frame, q):
-            continue
-        if run.watch.tell(done / len(changed), f"holds of frame {frame}"):
-            break
-        nearest = run.follower.frame(frame, q, goal=q)
-        if not predictor.good(frame, nearest):
-            nearest, good = predictor.predict(frame, q, effort_from=q)
-            if not good:
-                continue
-        recursion.q[frame] = nearest
 
 
 class Group(NamedTuple):

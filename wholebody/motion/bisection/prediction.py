@@ -71,17 +71,9 @@ class Predictor:
         self._weights = np.where(root_freedoms(figure.model), ROOT_WEIGHT, figure.effort_weights)
         self._measures = (Effort(), RootEffort()) if moves else (Effort(),)
 
-    def predict(
-        self,
-        frame: int,
-        start: Array,
-        planes: Sequence[Plane] = (),
-        *,
-        effort_from: Array | None = None,
-        most: int | None = None,
-    ) -> Prediction:
+    def predict(self, frame: int, start: Array, planes: Sequence[Plane], most: int | None = None) -> Prediction:
         """Predict the posture of a frame, from a start (nq,), within further planes, by `most` iterations."""
-        # Holds refer to the original posture of the frame, and the effort too, or to `effort_from` (nq,).
+        # Holds refer to the original posture of the frame, and the effort too.
         scene, terms = self.run.scene, self.run.terms
         asked = terms.asked(frame)
         goals = [term for term in asked if isinstance(term, Goal)]
@@ -96,8 +88,6 @@ class Predictor:
         )
         self.run.work.leave_out(frame, problem.left_out)
         problem.clearances[self._together(frame)] = 0.0
-        if effort_from is not None:
-            problem.measures = tuple(measure.resolve(scene, effort_from) for measure in self._measures)
         steps = itertools.count(1)
         progress = None if most is None else lambda entry: next(steps) >= most
         solution = self._method.solve(problem.with_start(start), progress)

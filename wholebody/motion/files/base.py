@@ -71,21 +71,24 @@ def frame_count(word: str, where: str) -> int:
     return int(word)
 
 
-def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: int) -> Array:
+def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: Sequence[str]) -> Array:
     """The numbers of rows (n, columns), each with the number of its line; a wrong one is refused with this line."""
-    found = np.empty((len(rows), columns))
+    found = np.empty((len(rows), len(columns)))
     for k, (line, words) in enumerate(rows):
-        if len(words) != columns:
+        if len(words) != len(columns):
             raise FileFormatError(
-                f"{name}, line {line}: {len(words)} values and not {columns}; the line is cut off or wrong"
+                f"{name}, line {line}: {len(words)} values and not {len(columns)}; the line is cut off or wrong"
             )
         try:
             found[k] = [float(word) for word in words]
         except ValueError:
             found[k] = [number(word, f"{name}, line {line}") for word in words]
-        if not (np.abs(found[k]) <= LARGEST).all():
-            wrong = int(np.flatnonzero(~(np.abs(found[k]) <= LARGEST))[0])
-            raise FileFormatError(
-                f"{name}, line {line}: value {wrong + 1} is {one_line(words[wrong], 20)}; give finite numbers"
-            )
+    broken = np.argwhere(~(np.abs(found) <= LARGEST))
+    if len(broken):
+        row, column = (int(place) for place in broken[0])
+        said = f"{columns[column]} is {one_line(rows[row][1][column], 20)}"
+        raise FileFormatError(
+            f"{name}, line {rows[row][0]}: {said}; {len(broken)} values are not finite or beyond {LARGEST:g}; correct "
+            "or cut those frames"
+        )
     return found

@@ -74,7 +74,7 @@ def parsed(text: str, name: str) -> BvhText:
     dt = seconds(step, f"{name}, line {number}")
     wide = sum(len(joint.channels) for joint in place.joints)
     rows = _unwrapped([(number, line.split()) for number, line in lines[rest:]], count, wide)
-    values = table(name, rows[:count], wide)
+    values = table(name, rows[:count], [f"value {k + 1}" for k in range(wide)])
     if len(rows) != count:
         number = rows[-1][0] if rows else number
         what = "cut off" if len(rows) < count else "longer than it says"

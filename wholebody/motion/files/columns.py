@@ -12,16 +12,14 @@ from types import MappingProxyType
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, is_number, known, shown, warn
+from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, is_number, known, warn
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip import LARGEST
-from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, check_one
+from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, check_one, table
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
-LATEST = 1e9  # s
 TIME = "time"
 UNIT = re.compile(r"\s*[\[(](deg|degrees|°|rad|radians)[\])]$|[\s_](deg|degrees|rad|radians)$", re.IGNORECASE)
 
@@ -121,27 +119,26 @@ def _values(path: Path, figure: Figure, columns: Mapping[str, str], degrees: boo
         first, lines = _without_names(path, first, wanted, [(number, first), *lines])
     check_one(given, figure, f"{path.name}: the table")
     names = _columns(f"{path.name}, line {number}", first, wanted)
-    table, places, decimals = _numbers(path, number, lines, names)
+    rows, time = list(lines), names.index(TIME)
+    if len(rows) < 2:
+        last = rows[-1][0] if rows else number
+        raise FileFormatError(
+            f"{path.name}, line {last}: a clip has a line of names and at least two frames; the file is cut off"
+        )
+    found = table(path.name, rows, names)
     given = given if len(given) == len(names) else names  # a file without names has no time either
     units = [_in_degrees(*each, figure, default=degrees) for each in zip(given, names, strict=True)]
-    table[:, units] = np.radians(table[:, units])
-    dt = _time_step(path, table[:, names.index(TIME)], places, decimals)
-    broken = np.argwhere(~(np.abs(table) <= LARGEST))
-    if len(broken):
-        row, column = (int(k) for k in broken[0])
-        raise FileFormatError(
-            f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
-            f"finite or beyond {LARGEST:g}; correct or cut those frames"
-        )
+    found[:, units] = np.radians(found[:, units])
+    dt = _time_step(path, found[:, time], [line for line, _ in rows], max(_decimals(words[time]) for _, words in rows))
     missing = [name for name in wanted if name not in names]
     if missing:
         more = f" and {len(missing) - 4} more" if len(missing) > 4 else ""
         warn(f"{path.name}: no column for {', '.join(missing[:4])}{more}; they stay as in the neutral posture")
     still = [resting[name] if at is None else figure.neutral[at] for name, at in columns_of.items()]
-    values = np.tile(still, (len(table), 1))
+    values = np.tile(still, (len(found), 1))
     for column, name in enumerate(wanted[1:]):
         if name in names:
-            values[:, column] = table[:, names.index(name)]
+            values[:, column] = found[:, names.index(name)]
     return values, dt
 
 
@@ -207,33 +204,13 @@ def _of_root(name: str) -> str | None:
     return column if column in ROOT_COLUMNS else None
 
 
-def _numbers(
-    path: Path, number: int, lines: Iterator[tuple[int, list[str]]], names: list[str]
-) -> tuple[Array, list[int], int]:
-    """The numbers of all lines (n, columns), the line of each row, and how many decimals the times have."""
-    rows, places, decimals, at = [], [], 0, names.index(TIME)
-    for number, line in lines:
-        if len(line) != len(names):
-            raise FileFormatError(f"{path.name}, line {number}: {len(line)} values for {len(names)} columns")
-        try:
-            rows.append([float(value) for value in line])
-        except ValueError:
-            wrong = next(value for value in line if not is_number(value))
-            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is not a number") from None
-        places.append(number)
-        decimals = max(decimals, len(line[at].strip().partition(".")[2]) if "e" not in line[at].lower() else 17)
-    if len(rows) < 2:
-        raise FileFormatError(
-            f"{path.name}, line {number}: a clip has a line of names and at least two frames; the file is cut off"
-        )
-    return np.array(rows), places, decimals
+def _decimals(time: str) -> int:
+    """How many decimals a time has as it is written; as many as a number has with an exponent."""
+    return len(time.strip().partition(".")[2]) if "e" not in time.lower() else 17
 
 
 def _time_step(path: Path, time: Array, places: list[int], decimals: int) -> float:
     """The mean step of times (n,) that are rounded to some decimals."""
-    if not (np.abs(time) < LATEST).all():
-        bad = int(np.flatnonzero(~(np.abs(time) < LATEST))[0])
-        raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
     dt = float(time[-1] - time[0]) / (len(time) - 1)
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; {TIME_STEP_ASKED}")

@@ -28,15 +28,13 @@ def write(motion: Motion, path: Path) -> Path:
     _check_figure(motion.figure)
     angles = np.unwrap(angles_about(Rotation.from_quat(motion.q[:, 3:ROOT_SIZE]), np.eye(3)), axis=0)
     rows = np.hstack([motion.q[:, :3], angles, motion.q[:, ROOT_SIZE:]])
-    joints = motion.q.shape[1] - ROOT_SIZE
-    names = [*(f"G{k + 1}" for k in range(GLOBAL)), *(f"Q{k + 1}" for k in range(joints))]
     lines = [
         f"# Joint profiles in rad: {motion.name}",
         "# first row is delta time",
         "# second row is the number of increments",
         "# next row is the initial Q values, followed by the Q values for time 2 and so on",
         f"# joints: {' '.join(motion.figure.joints)}",
-        "# " + "\t".join(names),
+        "# " + "\t".join(_names(motion.figure)),
         repr(motion.dt),
         str(len(rows)),
         *("\t".join(f"{value:.9f}" for value in row) for row in rows.tolist()),
@@ -60,9 +58,14 @@ def read(path: Path, figure: Figure) -> Frames:
     if len(frames) != count:
         line = frames[-1][0] if len(frames) < count else frames[count][0]
         raise FileFormatError(f"{name}, line {line}: {len(frames)} rows and not {count}; the file is cut off or wrong")
-    values = table(name, frames, GLOBAL + figure.model.nq - ROOT_SIZE)
+    values = table(name, frames, _names(figure))
     turns = Rotation.from_euler("XYZ", values[:, 3:GLOBAL]).as_quat()
     return Frames(np.hstack([values[:, :3], turns, values[:, GLOBAL:]]), dt, title_of(path))
+
+
+def _names(figure: Figure) -> list[str]:
+    """Names of the values of a row."""
+    return [*(f"G{k + 1}" for k in range(GLOBAL)), *(f"Q{k + 1}" for k in range(figure.model.nq - ROOT_SIZE))]
 
 
 def _check_figure(figure: Figure) -> None:

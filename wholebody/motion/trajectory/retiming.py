@@ -44,7 +44,7 @@ def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = Non
     low = np.clip(1.0 - most, 0.0, high)  # unknowns are 1 - b
     P, c, G, lower = bands, np.zeros(count), sp.csr_matrix((0, count)), np.zeros(0)
     if loads is not None and len(loads.gap):
-        rate = _rate(count, dt)[loads.frame]
+        rate = sp.csr_matrix(np.gradient(np.eye(count), dt, axis=0))[loads.frame]
         rows = sp.diags(loads.speed) @ sp.eye(count, format="csr")[loads.frame] + sp.diags(loads.change) @ rate
         ahead = np.asarray(rows @ np.ones(count)).ravel() + loads.gap  # of b = 1
         slacks = len(loads.gap)
@@ -58,18 +58,6 @@ def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = Non
     )  # fmt: skip
     z = minimise(program).z[:count]
     return np.asarray(1.0 - np.clip(z, low[:count], high[:count]))
-
-
-def _rate(count: int, dt: float) -> sp.csr_matrix:
-    """(n, n) derivative of values at frames with respect to time: central, and one-sided at both ends."""
-    if count < 2:
-        return sp.csr_matrix((count, count))
-    rate = sp.lil_matrix((count, count))
-    for k in range(count):
-        before, after = max(k - 1, 0), min(k + 1, count - 1)
-        rate[k, after] = 1.0 / ((after - before) * dt)
-        rate[k, before] = -1.0 / ((after - before) * dt)
-    return sp.csr_matrix(rate)
 
 
 def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:

@@ -10,7 +10,6 @@ active row has an entry, the deviation that minimises the objective is zero.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
@@ -39,24 +38,8 @@ Cancel = Callable[[int, float], bool]
 """Called with the number of steps and the worst shortfall; true ends the iterations."""
 
 
-@dataclass(frozen=True)
-class SQPSettings:
-    """Numbers of the iterations."""
-
-    # first trust region, radians and metres; larger = fewer programs on clear paths, more that are refused
-    radius: float = 0.25
-    largest: float = 0.5  # largest trust region
-    smallest: float = 1e-4  # a smaller one ends the iterations, or raises the penalty
-    within: float = 0.1  # metres; pairs nearer than this have rows: what a radius moves the end of a limb by
-    # radians and metres; a step no larger ends the iterations where everything is met. Larger = rougher optima, faster.
-    still: float = 2e-3
-    gain: float = 5e-3  # share of the objective; a step that brings no more ends them too
-    # of a shortfall at first, 1/m; it is raised tenfold where a step leaves more than half of a shortfall
-    penalty: float = 1e3
-    highest: float = 1e6  # penalty, 1/m
-
-
-SETTINGS = SQPSettings()
+RADIUS = 0.25  # rad, m: first trust region; larger = fewer programs on clear paths, more that are refused
+HIGHEST = 1e6  # 1/m: penalty of a shortfall, at most
 
 
 class End(Enum):
@@ -94,9 +77,10 @@ class _Filter:
     """Which points are accepted, and the trust region and penalty that follow from this."""
 
     def __init__(self, radius: float | None, largest: float | None) -> None:
-        self.radius = SETTINGS.radius if radius is None else radius
-        self._largest = SETTINGS.largest if largest is None else largest
-        self.penalty, self._little = SETTINGS.penalty, 0
+        self.radius = RADIUS if radius is None else radius
+        self._largest = 0.5 if largest is None else largest
+        # 1/m; it is raised tenfold where a step leaves more than half of a shortfall
+        self.penalty, self._little = 1e3, 0
         self._entries: list[tuple[float, float]] = []
 
     def takes(self, there: _At, here: _At) -> bool:
@@ -113,7 +97,7 @@ class _Filter:
         left = there.worst > MET and there.total > 0.5 * here.total
         self._little = self._little + 1 if left and small else 0
         if left and longest < 0.9 * self.radius:
-            self.penalty = min(10.0 * self.penalty, SETTINGS.highest)
+            self.penalty = min(10.0 * self.penalty, HIGHEST)
         if self._little >= 2:  # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
             self.radius = 0.5 * min(self.radius, longest)
         elif longest > 0.9 * self.radius and not self._little:
@@ -122,11 +106,11 @@ class _Filter:
     def refuse(self, here: _At, longest: float) -> bool:
         """Adapt to a step that was not taken; whether there is another one to try."""
         self.radius = 0.5 * min(self.radius, longest)
-        if self.radius >= SETTINGS.smallest:
+        if self.radius >= 1e-4:  # rad, m
             return True
-        if here.worst <= MET or self.penalty >= SETTINGS.highest:
+        if here.worst <= MET or self.penalty >= HIGHEST:
             return False
-        self.penalty, self.radius = min(10.0 * self.penalty, SETTINGS.highest), 0.1 * SETTINGS.radius
+        self.penalty, self.radius = min(10.0 * self.penalty, HIGHEST), 0.1 * RADIUS
         self._entries.clear()
         return True
 
@@ -174,7 +158,8 @@ class WindowProgram:
             longest = float(np.abs(step).max(initial=0.0))
             more, there = self._joined(here, step, counts), self._at(there_x)
             gained = abs(here.objective - there.objective)
-            small = longest <= SETTINGS.still or gained <= SETTINGS.gain * max(here.objective, 1e-9)
+            # rad and m, and a share of the objective, that are no gain: larger = rougher optima, faster
+            small = longest <= 2e-3 or gained <= 5e-3 * max(here.objective, 1e-9)
             taken = filter_.takes(there, here)
             if taken:
                 filter_.accept(here, there, longest, small)
@@ -213,7 +198,7 @@ class WindowProgram:
 
     def _at(self, x: Array) -> _At:
         """The rows at deviations, the objective and the shortfalls; a fifth of what an equality misses counts."""
-        rows = [self._evaluator.at(node, x, SETTINGS.within) for node in self.nodes]
+        rows = [self._evaluator.at(node, x, 0.1) for node in self.nodes]  # m: what a radius moves the end of a limb by
         beyond = SOFT * float(sum(one.shortfalls.sum() for one in rows if one.node.soft))
         past, hard = self._limits.passed(x), [one for one in rows if not one.node.soft]
         total = float(sum(one.shortfalls.sum() + np.abs(one.equal).sum() for one in hard) + past.sum())

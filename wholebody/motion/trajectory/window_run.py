@@ -9,7 +9,6 @@ on.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
@@ -33,22 +32,9 @@ from wholebody.motion.windows import Window
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
 
 
-@dataclass(frozen=True)
-class WindowSettings:
-    """Numbers of the windows."""
-
-    # seconds of smoothness of the first answer; where it is shorter, more attempts end on a wrong side
-    first: float = 0.1
-    # rougher and smoother: shares of this time in the second answer
-    rougher: float = 0.4
-    smoother: float = 1.5
-    jerk: float = 1.2  # parts of the original's; an answer with more is made smoother
-    share: float = 0.1  # of the squared deviation; acceleration that costs less leaves little to gain
-    rounds: int = 12  # of sweeping and adding places between frames
-    iterations: int = 40  # most steps of one run; a step takes one to three programs
-
-
-SETTINGS = WindowSettings()
+FIRST = 0.1  # s: smoothness of the first answer; where it is shorter, more attempts end on a wrong side
+JERK = 1.2  # parts of the original's; an answer with more is made smoother
+ITERATIONS = 40  # most steps of one run; a step takes one to three programs
 
 
 class WindowResult(NamedTuple):
@@ -129,7 +115,7 @@ class ClipRun:
         # with `whole` false the last frame of a part is free; what ended early goes on only if `patient`
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
-        objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
+        objective = self._objective(own, FIRST if self._time is None else self._time)
         starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
             begins = self._starts(own, found.depths)
@@ -196,14 +182,15 @@ class ClipRun:
     def _again(self, found: _Attempt, own: _Window) -> _Attempt:
         """An answer once more, smoother where its jerk is not allowed, else less smooth and nearer to the original."""
         jerk, square = self._jerk(own, found.x), float((found.x**2).sum())
-        rough = jerk > SETTINGS.jerk
-        if not rough and found.objective < (1.0 + SETTINGS.share) * 0.5 * square:
+        rough = jerk > JERK
+        # acceleration that costs less than a tenth of the squared deviation leaves little to gain
+        if not rough and found.objective < 1.1 * 0.5 * square:
             return found
-        objective = self._objective(own, SETTINGS.first * (SETTINGS.smoother if rough else SETTINGS.rougher))
+        objective = self._objective(own, FIRST * (1.5 if rough else 0.4))
         other = self._attempt(found, own, objective, _Way(NEARLY))
         if other is None or not other.free:
             return found
-        better = self._jerk(own, other.x) <= SETTINGS.jerk and (rough or (other.x**2).sum() < square)
+        better = self._jerk(own, other.x) <= JERK and (rough or (other.x**2).sum() < square)
         return other if better else found
 
     def _jerk(self, own: _Window, x: Array) -> float:
@@ -240,14 +227,14 @@ class ClipRun:
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
         work = self._run.work
-        program = WindowProgram(own.evaluator, objective, own.limits, SETTINGS.iterations)
+        program = WindowProgram(own.evaluator, objective, own.limits, ITERATIONS)
         program.add(begun.between)
         x, radius = begun.x, way.radius
 
         def report(count: int, worst: float) -> bool:
-            return own.cancel(count / SETTINGS.iterations)
+            return own.cancel(count / ITERATIONS)
 
-        for number in range(SETTINGS.rounds):
+        for number in range(12):  # of sweeping and adding places between frames
             # from the third round on it is nearly free, and what is missed then seldom is on the wrong side
             found = program.run(x, report, radius, way.largest, way.early and number < 2)
             work.programs += found.programs
