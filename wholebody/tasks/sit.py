@@ -43,7 +43,7 @@ class Sit(ContactTerm):
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
 
     Raises:
-        InputError: a value of the wrong kind, shape or range; in a problem, a thing that is to be its own back has none.
+        InputError: a value of the wrong kind, shape or range; in a problem, a seat that is to be the back has none.
         UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
