@@ -5,6 +5,8 @@ docs/theory/qp_programs.md has the equations (Hintermueller, Ito and Kunisch 200
 
 from __future__ import annotations
 
+from functools import lru_cache
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +14,7 @@ import numpy as np
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
-from wholebody.methods.qp.settings import CORRECTIONS, DESCENT
+from wholebody.methods.qp.settings import CORRECTIONS, DESCENT, Corrections
 
 SEMISMOOTH = "semismooth newton"
 """What `QPSolution.by` says of answers that `last_resort` found."""
@@ -32,11 +34,15 @@ def _corrected(
 ) -> tuple[bool, Array, ActiveSet]:
     """Correct a guessed active set, with all elastic rows: whether it is right then, the minimiser (n,), the set."""
     program.check_shapes(guess)
-    x, active = np.empty(program.size), ActiveSet(*(part.copy() for part in guess))
-    limits, key = with_values(CORRECTIONS, rounds=0, most=corrections), np.arange(len(program.least))
-    known = np.flatnonzero(guess.elastic)
-    rounds = compiled_kernel().grow(program.packed(), key, known, active, limits, room, x)
+    x, active = np.empty(program.size), ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
+    key, known = np.arange(len(guess.elastic)), guess.elastic.nonzero()[0]
+    rounds = compiled_kernel().grow(program.packed(), key, known, active, _of_all_rows(corrections), room, x)
     return rounds >= 0, x, active
+
+
+@lru_cache(maxsize=8)
+def _of_all_rows(corrections: int) -> Corrections:
+    return with_values(CORRECTIONS, rounds=0, most=corrections)
 
 
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
@@ -48,8 +54,11 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
 def _without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, room: Room) -> Array | None:
     """Minimiser (n,), clipped to the box, with g = 0, an active set and targets (m,); None where not finite."""
     without = with_values(program, linear=np.zeros(program.size), target=target)
-    _, x, _ = _corrected(without, active, 1, room)  # a first look at a set does not change it
-    return np.minimum(np.maximum(x, program.lower), program.upper) if np.isfinite(x).all() else None
+    settled, x, _ = _corrected(without, active, 1, room)  # x is of the set before its first correction
+    if settled:
+        return x
+    finite = isfinite(x.dot(x)) or np.isfinite(x).all()  # the first takes a fifth of the time
+    return np.minimum(np.maximum(x, program.lower), program.upper) if finite else None
 
 
 class Parts(NamedTuple):
