@@ -216,7 +216,9 @@ class Lineariser:
         contacts, count, _ = self._pass(q, within, (value, box, measure, self._no_squares))
         front = self._front.get(count)
         if front is None:
-            front = self._front[count] = self._jacobian[: len(value) + count], *(part[:count] for part in self._gaps)
+            gap, contact, clearance = self._gaps
+            front = self._jacobian[: len(value) + count], gap[:count], contact[:count], clearance[:count]
+            self._front[count] = front
         jacobian, gap, contact, clearance = front
         return PackedLinearisation(
             self.state.q, self._plan.goal_rows, value, jacobian, contacts, gap, contact, clearance, measure, box
