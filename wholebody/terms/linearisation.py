@@ -214,11 +214,15 @@ class Lineariser:
         """What `at` returns, in arrays that the next question to the workspace overwrites."""
         value, box, measure = self._value, self._box, self._measure
         contacts, count, _ = self._pass(q, within, (value, box, measure, self._no_squares))
-        gap, contact, clearance = self._gaps
+        front = self._front.get(count)
+        if front is None:
+            gap, contact, clearance = self._gaps
+            front = self._jacobian[: len(value) + count], gap[:count], contact[:count], clearance[:count]
+            self._front[count] = front
+        jacobian, gap, contact, clearance = front
         return PackedLinearisation(
-            self.state.q, self._plan.goal_rows, value, self._jacobian[: len(value) + count], contacts, gap[:count],
-            contact[:count], clearance[:count], measure, box,
-        )  # fmt: skip
+            self.state.q, self._plan.goal_rows, value, jacobian, contacts, gap, contact, clearance, measure, box
+        )
 
     def _pass(
         self, q: Array, within: float, room: tuple[Array, Array, Array, Array]
@@ -294,13 +298,14 @@ class Lineariser:
         self._rows = *self._near.arrays, np.zeros(contacts), np.zeros((rows, 6)), gap, contact, joints, clearance
         self._jacobian, self._value = np.empty((terms + rows, self.state.model.nv)), np.empty(terms)
         self._term_wrench = np.empty((terms, 6))
+        self._front: dict[int, tuple[Array, Array, Indices, Array]] = {}  # views of the first so many gaps
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
         """Write values and rows of terms of other classes."""
         state = self.state
         for term, evaluate, row, rows in others:
             part, derivative = term.value_and_jacobian(state, evaluate)
-            part = np.atleast_1d(part) if np.ndim(part) != 1 else part
+            part = part if type(part) is np.ndarray and part.ndim == 1 else np.atleast_1d(part)
             checked_count(term, len(part), rows)
             check_row_count(term, part, derivative, state.model.nv)
             value[row : row + rows] = part

@@ -95,7 +95,7 @@ class TermPlan(NamedTuple):
         places = dict[int, int]()
         for goal, old, known in zip(goals, before, self.goals, strict=True):
             if only_moved(goal, old):
-                place = places.get(kinds.RESIDUAL) or int(self.layout[kinds.RESIDUAL, 0])
+                place = places.get(kinds.RESIDUAL, 0)  # the first table
                 self.floats[place + 24 : place + 27] = goal.resolved_target  # type: ignore[attr-defined]
                 places[kinds.RESIDUAL] = place + kinds.WIDTHS[kinds.RESIDUAL][0]
             elif known is None or not self._put(goal, model, known, places):

@@ -48,7 +48,7 @@ def test_along_the_rows_the_lagrangian_falls_by_half_of_the_curvature(random_pro
                           upper=program.upper + 1e3)  # fmt: skip
         solver = make_solver("active_set")
         answer = solver.solve_cold(program)
-        t = parts_of(program, answer, np.zeros(0), room_for(program).work).tangential
+        t = parts_of(program, answer, np.zeros(0), room_for(program)).tangential
         rows = rows_of(program, rng)
         multipliers = multipliers_of(program, answer, rows, 1.0)
         before = lagrangian(multipliers, 0.0, rows)
@@ -65,7 +65,7 @@ def test_what_a_step_to_a_bound_is_to_bring_counts_the_way_there():
     )  # fmt: skip
     solver = make_solver("active_set")
     answer = solver.solve_cold(program)
-    t = parts_of(program, answer, np.zeros(0), room_for(program).work).tangential
+    t = parts_of(program, answer, np.zeros(0), room_for(program)).tangential
     assert t == pytest.approx([0.2, 0.0], abs=1e-5)
     multipliers = multipliers_of(program, answer, rows_of(program, np.random.default_rng(0)), 1.0)
     model = float(-program.linear @ t - 0.5 * t @ t)

@@ -10,6 +10,7 @@ import pytest
 from tests.reference import active_set as reference
 from tests.reference.active_set import guess_active_set, objective, same
 from wholebody.base.arrays import with_values
+from wholebody.base.compiled import compiled
 from wholebody.base.errors import UnknownNameError
 from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.face_kernel import Face, minimise_on_face
@@ -130,6 +131,12 @@ def guessed_set(rng, size, rows):
     return guess._replace(upper=guess.upper & ~guess.lower)
 
 
+@compiled(error_model="numpy")
+def on_face(program, active, face, count, tolerance, x):
+    """The minimiser, which compiled loops alone call."""
+    return minimise_on_face(program, active, face, count, tolerance, x)
+
+
 @pytest.mark.parametrize("rows", ROWS)
 def test_the_compiled_minimiser_on_a_face_is_that_of_array_code(random_program, rows):
     """200 random programs of each kind, 1,000 in all: the minimiser, the gradient there and the push of every row."""
@@ -150,7 +157,7 @@ def test_the_compiled_minimiser_on_a_face_is_that_of_array_code(random_program, 
             stacked, right, 1.0 / weight, push, gradient, np.empty(0), np.empty((max(n, 1), n)), np.empty(n * n),
             np.empty(n), np.empty(n),
         )  # fmt: skip
-        finite = minimise_on_face(program, active, face, count, CORRECTIONS.tolerance, x)
+        finite = on_face(program, active, face, count, CORRECTIONS.tolerance, x)
         assert finite
         assert np.abs(x - wanted.x).max() < 1e-9
         scale = 1.0 + np.abs(push).max(initial=0.0)

@@ -26,7 +26,7 @@ def parts(program: QuadraticProgram, shift: np.ndarray = NO_SHIFT) -> tuple[Part
     """The parts of the program's answer, and the answer."""
     solver = make_solver("active_set")
     answer = solver.solve_cold(program)
-    return parts_of(program, answer, shift, room_for(program).work), answer
+    return parts_of(program, answer, shift, room_for(program)), answer
 
 
 def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_program):

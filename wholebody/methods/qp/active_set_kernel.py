@@ -38,7 +38,7 @@ def grow(
                 chosen[j] = True
                 places[count] = j
                 count += 1
-        if not primal_dual_active_set(program, places[:count], active, limits.most, limits, room, x):
+        if not _primal_dual_active_set(program, places[:count], active, limits.most, limits, room, x):
             return -1
         missed = False
         for j in range(k):
@@ -59,8 +59,8 @@ def _contains(sorted_keys: Indices, key: int) -> bool:
     return low < len(sorted_keys) and sorted_keys[low] == key
 
 
-@compiled(error_model="numpy", forceinline=True)
-def primal_dual_active_set(
+@compiled(inner=True, error_model="numpy", forceinline=True)
+def _primal_dual_active_set(
     program: QuadraticProgram, places: Indices, active: ActiveSet, most: int, limits: Corrections, room: Room, x: Array
 ) -> bool:
     """Correct an active set for the rows `places` (c,), in place; x (n,) becomes the minimiser. Whether it is right."""
@@ -87,20 +87,6 @@ def primal_dual_active_set(
                 x[i] = min(max(x[i], lower[i]), upper[i])
             return True
     return False
-
-
-@compiled(error_model="numpy")
-def minimise_with(program: QuadraticProgram, active: ActiveSet, tolerance: float, work: Array, x: Array) -> bool:
-    """Minimiser x (n,) of a program with its active set fixed, clipped to the bounds; whether it is finite."""
-    soft = len(program.target)
-    own = face(work, len(x), soft, len(program.least))
-    stack_soft(program, own)
-    pushes = active.elastic.nonzero()[0]
-    stack_elastic(program, pushes, own)
-    finite = minimise_on_face(program, active, own, soft + len(pushes), tolerance, x)
-    for i in range(len(x)):
-        x[i] = min(max(x[i], program.lower[i]), program.upper[i])
-    return finite
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)

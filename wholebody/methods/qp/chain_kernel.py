@@ -50,7 +50,7 @@ class Room(NamedTuple):
     free: Mask  # (n,) whether a joint moves in the present step
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def reach(
     chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, asked: Array, expected: Array, found: Array
 ) -> int:  # fmt: skip

@@ -143,10 +143,13 @@ class PlainChain:
         lower, upper = self.chain.lower.copy(), self.chain.upper.copy()
         lower[self.held] = upper[self.held] = values[self.held]
         chain, size = with_values(self.chain, lower=lower, upper=upper), len(values)
-        room, found = self.room(rows_of(goals)), np.empty((1, 4))
-        at_rest = np.array([values, np.zeros(size)])
-        compiled_kernel().reach(chain, goals, room, values[None], at_rest, asked, np.zeros(1), found)
-        return values if found[0, 1] < np.inf else None
+        room, found = self.room(rows_of(goals)), np.empty((1, 1, 4))
+        at_rest = np.array([[values, np.zeros(size)]])
+        compiled_kernel().reach_all(
+            (chain, _NO_ARM, room), asked, (goals.tables[None], goals.entries), self.samples, at_rest,
+            values[None, None], found, np.ones(1, dtype=np.intp),
+        )  # fmt: skip
+        return values if found[0, 0, 1] < np.inf else None
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof."""

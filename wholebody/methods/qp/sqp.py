@@ -153,7 +153,7 @@ class SQP(Stage):
         """The step of a program with its predicted reduction; near the goals, with its two parts."""
         x, parts, flat, multipliers = answer.x, None, False, None
         if self.measures and here.violation.total <= self.width:
-            parts = parts_of(program, answer, self._shift, self._working_set.room(program).work)
+            parts = parts_of(program, answer, self._shift, self._working_set.room(program))
         if parts is None:
             saved = self.shared.subproblem.saving(program, here.rows, x)
         else:

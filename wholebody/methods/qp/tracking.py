@@ -199,7 +199,7 @@ class QPTracker(SolvingTracker):
         curved = share * motion * (share * answer.turn + TRACKING.off)  # roughly, and rather too much
         if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
-            if curved > unseen_by_rows(answer.asked):
+            if curved > min(max(answer.asked, TRACKING.inside), TRACKING.unseen):  # see `unseen_by_rows`
                 bent = program.turning.linearisation_error(at, program.rows, displacement)
             if bent > 0.0:
                 displacement, share, following = self._corrected(at, displacement, share, bent > TRACKING.midway)

@@ -64,7 +64,7 @@ def compiled_kernel(turning_kernel: Any) -> None:
     )  # fmt: skip
 
 
-def unseen_by_rows(asked: Array | float) -> Array:
+def unseen_by_rows(asked: Array) -> Array:
     """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
     unseen: Array = np.minimum(np.maximum(asked, TRACKING.inside), TRACKING.unseen)
     return unseen
