@@ -178,7 +178,7 @@ def test_a_path_round_a_ball_is_drawn_tight(free_bodies: Callable[..., wb.Figure
 def test_a_path_in_a_plane_beside_the_middle_of_a_ball_is_drawn_tight_and_stays_in_it(
     free_bodies: Callable[..., wb.Figure], least_distance: Distance
 ) -> None:
-    """The shortest one consists of two tangents and an arc of the circle that the plane cuts; over the ball is shorter."""
+    """The shortest one consists of two tangents and an arc of the circle that the plane cuts."""
     figure, far, around, high = free_bodies(wb.Sphere(0.1)), 1.0, 0.4, 0.25
     scene = wb.Scene(figure).add(wb.Sphere(around - 0.1), name="ball")
     rng, path = np.random.default_rng(0), []
@@ -199,6 +199,26 @@ def test_a_path_in_a_plane_beside_the_middle_of_a_ball_is_drawn_tight_and_stays_
     assert shortest - 1e-3 <= length(figure.model, found) < 1.03 * shortest
     assert np.abs(np.array(found)[:, 2] - high).max() < 5e-5
     assert least_along(scene, np.array(found), least_distance) >= -1e-4
+
+
+def test_a_path_of_an_arm_whose_tip_is_held_is_drawn_tight(planar_arm: Callable[..., wb.Figure]) -> None:
+    """What is held is curved: displacements along its tangents leave it, and are projected."""
+    figure = planar_arm((0.5, 0.5, 0.5, 0.5))
+    scene, start, tip = wb.Scene(figure), np.array([0.9, -0.7, -0.6, -0.5]), "tip"
+    problem = wb.Problem(scene, start, constraints=[wb.Hold(tip, orientation=False)])
+    rng, path = np.random.default_rng(1), [start]
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        steps.admit(start)
+        for _ in range(3):
+            path += steps.towards(path[-1], start + rng.normal(0.0, 0.5, 4))[0]
+        found = tighten(figure.model, path, steps, steps)
+    straight = length(figure.model, [path[0], path[-1]])
+    assert length(figure.model, path) > 1.5 * straight
+    assert straight <= length(figure.model, found) < 1.15 * straight
+    held = figure.placement(start, tip).translation
+    missed = [np.linalg.norm(figure.placement(q, tip).translation - held) for q in found]
+    assert np.max(missed) < 1e-4
 
 
 class HitLate(wb.Goal):

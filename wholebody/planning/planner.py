@@ -223,7 +223,7 @@ def _tighter(judge: _Judge, slides: TrackedMotions, path: list[Array], found: Pl
     """
     model = judge.problem.scene.model
     # what is drawn tight takes no longer until it is judged; the last program ends late
-    with within_budget(0.5 * BUDGET.left - judge.took):
+    with within_budget(max(0.5 * BUDGET.left - judge.took, 1e-9)):
         tight = [] if BUDGET.over else tighten(model, path, slides, slides)
     if not tight or length(model, tight) > 0.98 * length(model, path):
         return found

@@ -6,10 +6,10 @@ A path through postures q_k is displaced by tangents x_k that minimise
 
 where w_k, the inverse lengths of the motions between, make the first sum the length of the path (iteratively
 reweighted least squares), and rows are those of near pairs, constraints and limits, two for what is held, onto which
-displaced postures are projected. Free roots are displaced along the
-axes of the world, so that all freedoms share one matrix with a row for each posture. Its inverse is small, and leaves a
-program of the rows alone, whose multipliers Gauss-Seidel finds. Postures then move as far as straight motions between
-them are free. In an elastic band (Quinlan and Khatib 1993) each follows its neighbours alone, and takes tens of sweeps.
+displaced postures are projected. Free roots are displaced along the axes of the world, so that all freedoms share one
+matrix with a row for each posture. Its inverse is small, and leaves a program of the rows alone, whose multipliers
+Gauss-Seidel finds. Postures then move as far as straight motions between them are free. In an elastic band (Quinlan and
+Khatib 1993) each follows its neighbours alone, and takes tens of sweeps.
 """
 
 from __future__ import annotations
