@@ -230,10 +230,10 @@ class HitLate(wb.Goal):
         HitLate.asked += 1
         if HitLate.asked == 40:
             signal.raise_signal(signal.SIGINT)
-        return state.center_of_mass()[:1] - 9.0
+        return np.asarray(state.center_of_mass()[:1] - 9.0)
 
     def jacobian(self, state: Any) -> Array:
-        return state.center_of_mass_jacobian()[:1]
+        return np.asarray(state.center_of_mass_jacobian()[:1])
 
 
 def test_ctrl_c_ends_what_has_many_solves_and_not_one_of_these(planar_arm: Callable[..., wb.Figure]) -> None:

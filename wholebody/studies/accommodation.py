@@ -265,9 +265,9 @@ def accommodation(
     run = partial(Running.checked, "accommodation", jobs=jobs, progress=progress)
     # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
     varied = {"people": population, "targets": None, "layouts": None}
-    cases, *others = planned(task, varied, method, run, True, folder)
-    warn_of_first(cases, others[1].method, 2)
-    records = run_cases(cases, *others, lowers=False)
+    cases, warm, how, store = planned(task, varied, method, run, True, folder)
+    warn_of_first(cases, how.method, 2)
+    records = run_cases(cases, warm, how, store, lowers=False)
     if all(one.outcome == REFUSED for one in records):
         raise InputError(f"accommodation: everybody is refused; the first, {records[0].name}: {records[0].message}")
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)

@@ -89,9 +89,9 @@ def study(
     folder = running.pop("folder", None)
     run = partial(Running.checked, "study", **running)
     varied = {"people": people, "targets": targets, "layouts": layouts}
-    cases, *others = planned(task, varied, method, run, warm_start, folder)
-    warn_of_first(cases, others[1].method, 2)
-    return run_cases(cases, *others)
+    cases, warm, how, store = planned(task, varied, method, run, warm_start, folder)
+    warn_of_first(cases, how.method, 2)
+    return run_cases(cases, warm, how, store)
 
 
 def warn_of_first(cases: Sequence[Case], method: Method, level: int) -> None:
