@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -172,6 +173,78 @@ def test_a_path_round_a_ball_is_drawn_tight(free_bodies: Callable[..., wb.Figure
     assert shortest <= length(figure.model, found) < 1.02 * shortest
     np.testing.assert_array_equal([found[0], found[-1]], [path[0], path[-1]])
     assert least_along(scene, np.array(found), least_distance) >= 0.0
+
+
+def test_a_path_in_a_plane_beside_the_middle_of_a_ball_is_drawn_tight_and_stays_in_it(
+    free_bodies: Callable[..., wb.Figure], least_distance: Distance
+) -> None:
+    """The shortest one consists of two tangents and an arc of the circle that the plane cuts."""
+    figure, far, around, high = free_bodies(wb.Sphere(0.1)), 1.0, 0.4, 0.25
+    scene = wb.Scene(figure).add(wb.Sphere(around - 0.1), name="ball")
+    rng, path = np.random.default_rng(0), []
+    for share in np.linspace(0.0, np.pi, 40):
+        q = figure.neutral.copy()
+        q[:3] = -far * np.cos(share), 1.1 * np.sin(share) + 0.05 * rng.normal() * np.sin(share), high
+        path.append(q)
+    ball = next(iter(figure.segments))
+    problem = wb.Problem(scene, path[0], constraints=[wb.tasks.Plane(ball, (0.0, 0.0, 1.0))])
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        steps.admit(path[0])
+        steps.admit(path[-1])
+        found = tighten(figure.model, path, steps, steps)
+    circle = np.sqrt(around**2 - high**2)
+    shortest = 2.0 * np.sqrt(far**2 - circle**2) + circle * (np.pi - 2.0 * np.arccos(circle / far))
+    assert length(figure.model, path) > 1.3 * shortest
+    assert shortest - 1e-3 <= length(figure.model, found) < 1.03 * shortest
+    assert np.abs(np.array(found)[:, 2] - high).max() < 5e-5
+    assert least_along(scene, np.array(found), least_distance) >= -1e-4
+
+
+def test_a_path_of_an_arm_whose_tip_is_held_is_drawn_tight(planar_arm: Callable[..., wb.Figure]) -> None:
+    """What is held is curved: displacements along its tangents leave it, and are projected."""
+    figure = planar_arm((0.5, 0.5, 0.5, 0.5))
+    scene, start, tip = wb.Scene(figure), np.array([0.9, -0.7, -0.6, -0.5]), "tip"
+    problem = wb.Problem(scene, start, constraints=[wb.Hold(tip, orientation=False)])
+    rng, path = np.random.default_rng(1), [start]
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        steps.admit(start)
+        for _ in range(3):
+            path += steps.towards(path[-1], start + rng.normal(0.0, 0.5, 4))[0]
+        found = tighten(figure.model, path, steps, steps)
+    straight = length(figure.model, [path[0], path[-1]])
+    assert length(figure.model, path) > 1.5 * straight
+    assert straight <= length(figure.model, found) < 1.15 * straight
+    held = figure.placement(start, tip).translation
+    missed = [np.linalg.norm(figure.placement(q, tip).translation - held) for q in found]
+    assert np.max(missed) < 1e-4
+
+
+class HitLate(wb.Goal):
+    """A point that is out of reach, during whose first search Ctrl-C is hit."""
+
+    asked = 0
+
+    def error(self, state: Any) -> Array:
+        HitLate.asked += 1
+        if HitLate.asked == 40:
+            signal.raise_signal(signal.SIGINT)
+        return np.asarray(state.center_of_mass()[:1] - 9.0)
+
+    def jacobian(self, state: Any) -> Array:
+        return np.asarray(state.center_of_mass_jacobian()[:1])
+
+
+def test_ctrl_c_ends_what_has_many_solves_and_not_one_of_these(planar_arm: Callable[..., wb.Figure]) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.5)))
+    HitLate.asked = 0
+    with pytest.raises(KeyboardInterrupt):
+        wb.plan(scene, None, HitLate(), time_limit=2.0)
+    HitLate.asked = 0
+    with pytest.raises(KeyboardInterrupt):
+        wb.solutions(wb.Problem(scene, goals=[HitLate()]), starts=3)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_path_of_a_turning_body_that_waves_among_nothing_is_drawn_straight(

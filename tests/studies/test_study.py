@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,24 @@ def test_a_mistake_in_a_task_is_a_record() -> None:
     assert first.solved
     assert second.outcome == "refused"
     assert "a mistake in the task" in second.message
+
+
+def among_things(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+    scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=(0.4, 0.3, 0.5))
+    return wb.Problem(scene, goals=[wb.Point("hand", (0.4, 0.0, 0.5))])
+
+
+def test_what_a_method_leaves_out_of_a_study_is_said_once_before_it_is_computed() -> None:
+    """`dls` does not look at contacts; `qp` leaves nothing out."""
+    arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
+    people, told = {"one": arm, "two": arm}, r"method 'dls' leaves out contacts"
+    for run in (wb.study, wb.accommodation):
+        with pytest.warns(UserWarning, match=told) as said:
+            run(among_things, people=people, method="dls", progress=lambda _: True)
+        assert [one.filename for one in said] == [__file__]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wb.study(among_things, people=people, method="qp", progress=lambda _: True)
 
 
 def test_a_study_file_is_solved_by_command(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -190,7 +190,7 @@ class Descends(ABC):
     def leaves_out(self, problem: Problem) -> tuple[str, ...]:
         """Names of what this method does not look at, which the assessment alone judges; known without a search.
 
-        `wb.solve`, drags, paths, live pages and reach maps warn of it before they begin.
+        `wb.solve`, drags, paths, live pages, reach maps and studies warn of it before they begin.
         """
         return self._unseen(check_problem(problem, f"{type(self).__name__}.leaves_out: problem"))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -76,13 +76,18 @@ def method_for_motions(given: object) -> Method:
 
 def warn_of_left_out(method: Method, level: int, *problems: Problem) -> Method:
     """Say before anything is computed what a method does not look at; `level` as in `warnings.warn`, of the caller."""
-    if names := [*dict.fromkeys(name for problem in problems for name in _left_out(method, problem))]:
+    return warn_of_names(method, level + 1, [name for problem in problems for name in left_out(method, problem)])
+
+
+def warn_of_names(method: Method, level: int, found: Iterable[str]) -> Method:
+    """Say once what a method does not look at, by names that `left_out` found; `level` as in `warnings.warn`."""
+    if names := [*dict.fromkeys(found)]:
         said = f"method {method.name!r} leaves out {enumeration(names)}, which the assessment alone judges"
         warnings.warn(f"{said}; use method='qp'", stacklevel=level + 1)
     return method
 
 
-def _left_out(method: Any, problem: Problem) -> Sequence[str]:
+def left_out(method: Any, problem: Problem) -> Sequence[str]:
     """What a method does not look at of a problem that it takes; nothing of one that it refuses by an error."""
     if not hasattr(method, "leaves_out"):
         return ()

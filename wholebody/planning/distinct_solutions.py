@@ -16,7 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.batches import reporter
 from wholebody.methods.base import TIME_LIMIT, check_problem
 from wholebody.methods.contradictions import contradictions
-from wholebody.methods.control import BUDGET, within_budget
+from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
 from wholebody.methods.starts import all_found, throughout
@@ -128,7 +128,7 @@ def solutions(
     every = every and len(branches) > 0 and _stand_alone(problem, branches)
     total = len(branches) if every else starts
     ended = f"{total} start{'s were' if total != 1 else ' was'} made"
-    with within_budget(LONGEST if time_limit is None else np.inf):
+    with ctrl_c_ends_all(), within_budget(LONGEST if time_limit is None else np.inf):
         for start in islice(chain(branches, () if every else _starts(problem, starts, seed)), total):
             if begun and (BUDGET.over or ends <= time.perf_counter()):  # the first begins however long it took so far
                 ended = f"the time limit of {LONGEST if time_limit is None else time_limit:g} s ended it"

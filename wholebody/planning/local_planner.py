@@ -121,6 +121,10 @@ class Geodesics:
         """(2, c) least and largest values of constraints at postures of paths."""
         return self._kept.sides
 
+    def projected(self, q: Array) -> Array:
+        """The posture (nq,) near q that meets what is held; q itself here, as nothing is."""
+        return q
+
     def free(self, q: Array) -> bool:
         """Whether a posture (nq,) keeps the distances."""
         return self._seen(q) is not None
@@ -168,9 +172,16 @@ class Geodesics:
             seen = ahead
         return path, blocked
 
+    def met(self, q: Array) -> bool:
+        """Whether a posture (nq,) meets constraints as postures of paths do."""
+        return self._within(q, self._kept.sides)
+
     def keeps(self, q: Array) -> bool:
         """Whether a posture (nq,) misses no constraint by more than steps may."""
-        values, sides = self._values.at(self._workspace.state.update(q)), self._followed.sides
+        return self._within(q, self._followed.sides)
+
+    def _within(self, q: Array, sides: Array) -> bool:
+        values = self._values.at(self._workspace.state.update(q))
         return bool((values >= sides[0]).all() and (values <= sides[1]).all())
 
     def follows(self, q: Array, there: Array) -> bool:
@@ -242,7 +253,7 @@ class TrackedMotions:
     samples: ClassVar[int] = 12
     rounds: ClassVar[int] = 2  # a sample takes about as long as another end
     tries: ClassVar[int] = 12
-    spacing: ClassVar[float] = 0.015
+    spacing: ClassVar[float] = 0.04
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self.geodesics = Geodesics(problem, workspace)
@@ -334,6 +345,17 @@ class TrackedMotions:
         """The posture (nq,) that is displaced from q by a tangent (nv,), within limits."""
         return self._problem.scene.figure.clamp(np.asarray(pin.integrate(self._model, q, away)))
 
+    def projected(self, q: Array) -> Array:
+        """See `Geodesics`."""
+        return self._settled(q) if self._held else q
+
+    def _settled(self, q: Array) -> Array:
+        for _ in range(2):  # what is held is missed by the square of a step
+            q = self._settling.step(q, measures=False).q
+            if self.geodesics.met(q):
+                break
+        return q
+
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `Geodesics`."""
         found, late = path.copy(), np.zeros(len(path), dtype=bool)
@@ -341,9 +363,7 @@ class TrackedMotions:
             if BUDGET.over:
                 late[k:] = True
                 break
-            for _ in range(2):  # what is held is missed by the square of a step
-                q = self._settling.step(q, measures=False).q
-            found[k] = q
+            found[k] = self._settled(q)
         steps, usual = (np.array([self._apart(*pair) for pair in pairwise(each)]) for each in (found, path))
         return found, (steps > 1.5 * usual + REACHED) | late[1:]  # projected on two sides of something
 

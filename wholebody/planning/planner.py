@@ -21,7 +21,7 @@ from wholebody.base.compiled import compile_all, compile_seconds
 from wholebody.base.errors import InputError
 from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
-from wholebody.methods.control import BUDGET, within_budget
+from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
 from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
 from wholebody.planning.ends import answers
@@ -29,6 +29,7 @@ from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.search import Search
 from wholebody.planning.smoothing import length, refined, resampled, smooth
+from wholebody.planning.tightening import tighten
 from wholebody.planning.timing import Pace, Timing, used
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
@@ -129,7 +130,7 @@ def plan(
     goals = _goals(goal)
     compile_all(NEEDED)
     began = _computed()
-    with within_budget(max(limit, 0.1)):  # s: the straight motion of an arm takes less
+    with ctrl_c_ends_all(), within_budget(max(limit, 0.1)):  # s: the straight motion of an arm takes less
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         _check_end(problem, problem.start, "start")
         sampler = Sampler(problem, rng)
@@ -146,6 +147,8 @@ def plan(
                 if path is None:
                     break
                 found = _smoothed(judge, local, path)
+                if found.solved and local is slides:
+                    found = _tighter(judge, slides, path, found)
     if found is None:
         found = Plan(Clip(scene.figure, problem.start[None], pace.dt, "plan"), False, message)
     return replace(found, message=message if found.solved else found.message, seconds=_computed() - began)
@@ -199,10 +202,12 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     """
     model = judge.problem.scene.model
     count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
+    left = BUDGET.left
     with judge.in_time(path):
         even, _ = local.settled(refined(model, path, count))
         smoothed = smooth(model, even, local)
     found = judge.judged([smoothed])
+    judge.took = left - BUDGET.left
     if not (found.solved or BUDGET.over):
         found = judge.judged([even])
     if not (found.solved or BUDGET.over):
@@ -211,11 +216,27 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     return found
 
 
+def _tighter(judge: _Judge, slides: TrackedMotions, path: list[Array], found: Plan) -> Plan:
+    """A motion along a path drawn tight, in the time that is left; the one that was found where it is no longer.
+
+    Steps cost so much that a motion is found first, and made shorter afterwards.
+    """
+    model = judge.problem.scene.model
+    # what is drawn tight takes no longer until it is judged; the last program ends late
+    with within_budget(max(0.5 * BUDGET.left - judge.took, 1e-9)):
+        tight = [] if BUDGET.over else tighten(model, path, slides, slides)
+    if not tight or length(model, tight) > 0.98 * length(model, path):
+        return found
+    better = _smoothed(judge, slides, tight)
+    return better if better.solved and better.length < found.length else found
+
+
 class _Judge:
     """Judges motions from their postures alone."""
 
     def __init__(self, problem: Problem, pace: Pace) -> None:
         self.problem, self._pace = problem, pace
+        self.took = 0.0  # s: that a path took from here to its judgement
         spent = []
         for _ in range(3):  # the least, as a busy machine takes several times as long now and then
             began = _computed()

@@ -75,7 +75,8 @@ def banded(model: pin.Model, path: list[Array], local: LocalPlanner) -> list[Arr
     at = _lengths(model, path)
     places = np.linspace(0.0, at[-1], max(4, int(np.ceil(at[-1] / APART)) + 1))
     even, found = resampled(model, path, len(places)), [path[0]]
-    for (low, high), q in zip(pairwise(places), even[1:], strict=True):
+    for (low, high), there in zip(pairwise(places), even[1:], strict=True):
+        q = local.projected(there)
         if not local.joined(found[-1], q, np.inf):
             found += [path[k] for k in np.flatnonzero((low < at) & (at < high))]
         found.append(q)

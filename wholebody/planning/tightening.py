@@ -5,10 +5,11 @@ A path through postures q_k is displaced by tangents x_k that minimise
     sum_k w_k |q_k+1 - q_k + x_k+1 - x_k|^2 + m sum_k |x_k|^2,   rows_k x_k + gap_k >= 0,
 
 where w_k, the inverse lengths of the motions between, make the first sum the length of the path (iteratively
-reweighted least squares), and rows are those of near pairs, constraints and limits. Free roots are displaced along the
-axes of the world, so that all freedoms share one matrix with a row for each posture. Its inverse is small, and leaves a
-program of the rows alone, whose multipliers Gauss-Seidel finds. Postures then move as far as straight motions between
-them are free. In an elastic band (Quinlan and Khatib 1993) each follows its neighbours alone, and takes tens of sweeps.
+reweighted least squares), and rows are those of near pairs, constraints and limits, two for what is held, onto which
+displaced postures are projected. Free roots are displaced along the axes of the world, so that all freedoms share one
+matrix with a row for each posture. Its inverse is small, and leaves a program of the rows alone, whose multipliers
+Gauss-Seidel finds. Postures then move as far as straight motions between them are free. In an elastic band (Quinlan and
+Khatib 1993) each follows its neighbours alone, and takes tens of sweeps.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.methods.control import BUDGET
+from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.smoothing import banded, length
@@ -51,12 +52,13 @@ def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: Tr
         damping = max(0.5 * damping, DAMPING) if better > 0.25 * program.foreseen else 4.0 * damping
         band = moved if better > 0.0 else band
         count = len(band)
-        band = _halved(model, band, cut) if count < 40 else band  # more = nearer to things, dearer
+        band = _halved(model, band, cut, local) if count < 40 else band  # more = nearer to things, dearer
         if len(band) == count and (0.0 < better < 0.003 * before or damping > 0.5):  # it is tight
             break
     found = [band[0]]
-    for q in band[1:]:
-        found += local.joined(found[-1], q, np.inf) or [q]
+    with within_budget(np.inf):  # motions that were free, once more
+        for q in band[1:]:
+            found += local.joined(found[-1], q, np.inf) or [q]
     return found
 
 
@@ -120,7 +122,7 @@ def _moved(
     while True:
         for k in np.flatnonzero(anew[1:-1]) + 1:
             step = share[k] * (program.turns[k].T @ program.away[k - 1])
-            moved[k] = slides.displaced(band[k], step) if share[k] else band[k]
+            moved[k] = local.projected(slides.displaced(band[k], step)) if share[k] else band[k]
         for k in np.flatnonzero(anew[:-1] | anew[1:]):
             # what is as before need not be proven: steps along things made it
             free[k] = not (share[k] or share[k + 1]) or bool(local.joined(moved[k], moved[k + 1], np.inf))
@@ -135,13 +137,13 @@ def _moved(
         share[anew] *= 0.4 if cuts < 3 else 0.0
 
 
-def _halved(model: pin.Model, band: list[Array], cut: Sequence[bool]) -> list[Array]:
+def _halved(model: pin.Model, band: list[Array], cut: Sequence[bool], local: LocalPlanner) -> list[Array]:
     """A path with postures in the middle of long motions beside cut displacements, as rows are those of postures."""
     found = [band[0]]
     inner = [False, *cut[1:-1], False]
     for (q, there), beside in zip(pairwise(band), map(any, pairwise(inner)), strict=True):
         if beside and length(model, [q, there]) > 0.1:  # rad, m: smaller = nearer to things, dearer
-            found.append(np.asarray(pin.interpolate(model, q, there, 0.5)))
+            found.append(local.projected(np.asarray(pin.interpolate(model, q, there, 0.5))))
         found.append(there)
     return found
 

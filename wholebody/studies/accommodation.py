@@ -23,7 +23,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.studies.many import Running, SolveProgress, run_cases
 from wholebody.studies.populations import people as sampled
 from wholebody.studies.records import CANCELLED, ENDED, REFUSED, Records
-from wholebody.studies.study import TaskFunction, Variant, loaded_person, planned
+from wholebody.studies.study import TaskFunction, Variant, loaded_person, planned, warn_of_first
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
@@ -265,7 +265,9 @@ def accommodation(
     run = partial(Running.checked, "accommodation", jobs=jobs, progress=progress)
     # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
     varied = {"people": population, "targets": None, "layouts": None}
-    records = run_cases(*planned(task, varied, method, run, True, folder), lowers=False)
+    cases, warm, how, store = planned(task, varied, method, run, True, folder)
+    warn_of_first(cases, how.method, 2)
+    records = run_cases(cases, warm, how, store, lowers=False)
     if all(one.outcome == REFUSED for one in records):
         raise InputError(f"accommodation: everybody is refused; the first, {records[0].name}: {records[0].message}")
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
@@ -12,13 +12,15 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 from wholebody.base import checks
-from wholebody.base.batches import fingerprint
-from wholebody.base.errors import InputError
+from wholebody.base.batches import fingerprint, own_child
+from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import read_bytes
 from wholebody.base.runner import packed
 from wholebody.figures import Figure, load
 from wholebody.figures.anthropometry import Person, design_cases, make_person
 from wholebody.methods.base import Method
+from wholebody.methods.qp.method import QP
+from wholebody.methods.solve import left_out, warn_of_names
 from wholebody.problem import Problem
 from wholebody.studies.many import Running, RunOptions, run_cases
 from wholebody.studies.records import KeptRecords, Records, SolveRecord
@@ -87,7 +89,27 @@ def study(
     folder = running.pop("folder", None)
     run = partial(Running.checked, "study", **running)
     varied = {"people": people, "targets": targets, "layouts": layouts}
-    return run_cases(*planned(task, varied, method, run, warm_start, folder))
+    cases, warm, how, store = planned(task, varied, method, run, warm_start, folder)
+    warn_of_first(cases, how.method, 2)
+    return run_cases(cases, warm, how, store)
+
+
+def warn_of_first(cases: Sequence[Case], method: Method, level: int) -> None:
+    """Say what a method leaves out of the first case before any is computed; `level` as in `warnings.warn`."""
+    if type(method) is QP:  # looks at all; making a person takes a second
+        return
+    try:  # a task of the user's own can end the process that makes it
+        names = own_child().call(_left_out, cases[0].make, method, seconds=0.0)
+    except WholebodyError:  # the records tell
+        return
+    warn_of_names(method, level + 1, names)
+
+
+def _left_out(make: Callable[[], Problem], method: Method) -> tuple[str, ...]:
+    try:
+        return tuple(left_out(method, make()))
+    except Exception:  # of a task of the user's own
+        return ()
 
 
 def planned(
