@@ -309,7 +309,9 @@ class Points(NamedTuple):
         at, freedom = limited.T
         room: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
         pair = 2 * freedom + np.array([[0], [1]])  # each side of each freedom, before the pairs of pieces
-        side, which = np.nonzero((room < reach[freedom]) & ~np.isin(pair, self.pair))
+        known = np.zeros(2 * model.nv, dtype=bool)
+        known[self.pair[self.pair < len(known)]] = True
+        side, which = np.nonzero((room < reach[freedom]) & ~known[pair])
         if not len(side):
             return self
         more = Points.room(len(side), model.nv, self.bodies, None)
