@@ -68,13 +68,15 @@ class Articulated:
         self._owners: Indices = np.array([number[name] for name in owners], dtype=np.intp)
         free = self._owners < (0 if engine is None else len(engine.bodies))
         # m: most distances of pairs that a step may lead into each other; the engine looks at the others
-        self._own_pairs = np.where(free[self._workspace.table.pairs].any(axis=1), -np.inf, 0.0)
+        self._own_pairs = np.where(free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
+        self._sag = np.zeros(
+            2 * self._model.nv + len(self._own_pairs) + 1
+        )  # m/s2: by limit and pair, the last for others
         self._old, self._flesh = Impulses.nothing(0), flesh_of(scene.geometry)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
-        self._turning = 0.0  # rad/s
-        self._asked, self._masses = b"", np.zeros((0, 0))
+        self._turning, self._asked, self._masses = 0.0, b"", np.zeros((0, 0))  # rad/s
         own = pin.crba(self._model, self._data, self.q).diagonal()
         light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
         self._model.armature += np.where(light, 1e-5, 1e-3 * own * aligning(self._model))
@@ -125,7 +127,6 @@ class Articulated:
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
-        # an impact with the figure that its program did not foresee ends the step, made again at most twelve times
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
         most = STEP if self._turning * time > FAR else time
@@ -151,10 +152,7 @@ class Articulated:
     def _attempt(
         self, time: float, planned: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]
     ) -> tuple[float, EngineFrame | None, bool]:
-        """A step of at most a time, of `planned` in which things are moved.
-
-        By how much, what the things did, and whether it leads into something, and is to be made again.
-        """
+        """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
         points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
         masses_begun = self._inertia(self.q)
@@ -184,7 +182,8 @@ class Articulated:
         motions = self._move(moves, segments, drifted, np.inf if self.stiffness.any() else began + paid)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         again = time > SHORTEST and self._stops > 0
-        if again and self._sunk(points, {name: motions[name][1] for name in moved}):
+        ended = points.gap + points.figure[::3] @ moves + time * points.given[::3]
+        if self._sunk(points, ended, time, {name: motions[name][1] for name in moved}) and again:
             return time, None, True
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
@@ -197,10 +196,11 @@ class Articulated:
         self._react({name: wrench for name, wrench in given.items() if name in segments}, motions, time, segments)
         return time, frame, False
 
-    def _sunk(self, points: Points, moved: Mapping[str, pin.SE3]) -> bool:
-        """Whether a step that began with points led deeper into what the engine does not keep apart."""
+    def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
+        """Whether a step of points that sought gaps (m,) led deeper into what the engine does not keep apart."""
         self._workspace.place(moved)
-        near = self._workspace.near(self.q, 0.0, self._own_pairs)
+        near = self._workspace.near(self.q, 1e-3, self._own_pairs)
+        self._sag = points.sag(ended, near, time, len(self._sag))
         began = points.gap[points.pair >= 2 * self._model.nv].min(initial=0.0)
         return float(near.distance.min(initial=0.0)) < min(-1e-4, began)  # m
 
@@ -291,7 +291,9 @@ class Articulated:
             weights = np.array([self._engine.weight(name) for name in points.bodies])
             falling = time * np.einsum("bij,bj->bi", points.responses[:, :, :3], weights).ravel()
         for again in range(4):
-            room = points.gap - SKIN  # a step removes an overlap
+            room = (
+                points.gap + time**2 * self._sag[np.minimum(points.pair, len(self._sag) - 1)] - SKIN
+            )  # a step removes an overlap
             target = np.where(room >= 0.0, -room / time, np.minimum(-room / time, 0.5))  # m/s, at most
             speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
             found, after = self._solved(inertia, points, speed, target, found)

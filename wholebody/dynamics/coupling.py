@@ -304,6 +304,18 @@ class Points(NamedTuple):
                     rate = sign * self.axes[k] @ moves.rate(self.place[k])
                     self.figure[3 * k : 3 * k + 3] += np.outer(rate, turned)
 
+    def sag(self, ended: Array, near: Contacts, time: float, count: int) -> Array:
+        """By how much pairs, of `count` numbers, came nearer in a step than to the gaps (m,) that it sought, m/s2.
+
+        What rolls does so again in the next step, over the square of its time.
+        """
+        least, found = np.full(count, np.inf), np.zeros(count)
+        np.minimum.at(least, np.minimum(self.pair, count - 1), ended)
+        pair = 2 * self.figure.shape[1] + near.number
+        met = np.isfinite(least[pair])
+        found[pair[met]] = np.minimum(near.distance[met] - least[pair[met]], 0.0) / time**2
+        return found
+
     def with_limits(self, model: pin.Model, limited: Indices, q: Array, reach: Array) -> Points:
         """These and the limits within reaches (nv,) at a posture; of `limited` (k, 2): places in q, in the velocity."""
         at, freedom = limited.T

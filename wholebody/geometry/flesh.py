@@ -95,7 +95,7 @@ def spreading(geometry: pin.GeometryModel, flesh: Flesh, joints: Any) -> Spreadi
         return None
     turn = -6.0 * share * (1.0 - share) / (STRAIGHT - BENT) * flesh.sign * cross(own, axis)
     ends = [np.vstack([one.placement.rotation.T, one.placement.translation]) for one in (straight, bent)]
-    now = between(*ends, share * share * (3.0 - 2.0 * share))
+    now = between(ends[0], ends[1], share * share * (3.0 - 2.0 * share))
     return Spreading(
         turn, int(bent.parentJoint), int(trunk.parentJoint), joint, pin.SE3(now[:3].T, now[3]), ends[1] - ends[0]
     )
