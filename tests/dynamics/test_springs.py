@@ -20,7 +20,8 @@ def rod(folder: Path) -> wb.Figure:
     path.write_text(
         f"""<robot name="rod"><link name="base"/><link name="rod"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
         <inertia ixx="1e-3" iyy="{0.4**2 / 12}" izz="{0.4**2 / 12}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-        <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"""
+        <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+        </joint></robot>"""
     )
     return wb.load(path)
 

@@ -202,7 +202,7 @@ class Articulated:
         near = self._workspace.near(self.q, 1e-3, self._own_pairs)
         self._sag = points.sag(ended, near, time, len(self._sag))
         began = points.gap[points.pair >= 2 * self._model.nv].min(initial=0.0)
-        return float(near.distance.min(initial=0.0)) < min(-1e-4, began)  # m
+        return bool(near.distance.min(initial=0.0) < min(-1e-4, began))  # m
 
     def _points(self, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, and the joint limits that it can reach."""
