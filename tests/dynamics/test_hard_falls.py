@@ -28,14 +28,16 @@ def falling(name: str, seed: int, boxes: bool, stiffness: float = 0.0) -> wb.Wor
 def test_joints_that_contacts_turn_fast_stop_at_their_limits(seed: int, boxes: bool) -> None:
     """They were at 13, 0.9 and 0.05 rad beyond: limits that a step's own impulses reached were not in its program."""
     world = falling("human", seed, boxes)
-    model, energies, most = world.scene.model, [world.energy], 0.0
+    model, energies, most, deepest = world.scene.model, [world.energy], 0.0, 0.0
     single = [joint.idx_q for joint in model.joints[1:] if joint.nq == joint.nv == 1]
     low, high = model.lowerPositionLimit[single], model.upperPositionLimit[single]
     for _ in range(60):
-        q = world.step().q[single]
+        frame = world.step()
+        q, deepest = frame.q[single], max(deepest, frame.deepest)
         most = max(most, (low - q).max(), (q - high).max())
         energies.append(world.energy)
     assert most < 0.011  # rad; 0.2 where a program that is not solved may leave more
+    assert deepest < 1e-4  # m; 0.5 mm where a step took a fifth of an overlap away, and gaps were linear in it
     assert np.diff(energies).max() < 1e-6
     assert energies[0] - energies[-1] > 200.0  # it has landed
 

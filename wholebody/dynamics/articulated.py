@@ -23,7 +23,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, share_below, turned
+from wholebody.dynamics.blows import BOUNCE, left_for_later
+from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, turned
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.pieces import Surfaces, places
@@ -31,10 +32,11 @@ from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.step_program import SKIN, Impulses
 from wholebody.figures.state import free_roots
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
+from wholebody.geometry.flesh import flesh_of
 from wholebody.scene.scene import Scene
 
-BOUNCE = 0.05  # m/s: slower approaches do not bounce
 LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
+FAR = 0.15  # rad: gaps are not linear in a step that turns a piece by more
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 
 
@@ -64,21 +66,27 @@ class Articulated:
         self._names = list(dict.fromkeys((*(() if engine is None else engine.names), *owners)))  # the engine's first
         number = {name: k for k, name in enumerate(self._names)}
         self._owners: Indices = np.array([number[name] for name in owners], dtype=np.intp)
-        self._old = Impulses.nothing(0)
+        free = self._owners < (0 if engine is None else len(engine.bodies))
+        # m: most distances of pairs that a step may lead into each other; the engine looks at the others
+        self._own_pairs = np.where(free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
+        self._sag = np.zeros(
+            2 * self._model.nv + len(self._own_pairs) + 1
+        )  # m/s2: by limit and pair, the last for others
+        self._old, self._flesh = Impulses.nothing(0), flesh_of(scene.geometry)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
-        self._asked, self._masses = b"", np.zeros((0, 0))
+        self._turning, self._asked, self._masses = 0.0, b"", np.zeros((0, 0))  # rad/s
         own = pin.crba(self._model, self._data, self.q).diagonal()
         light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
         self._model.armature += np.where(light, 1e-5, 1e-3 * own * aligning(self._model))
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
-        free = [joint for joint in self._model.joints[1:] if joint.nq == joint.nv == 1]  # the first is the world
+        single = [(one.idx_q, one.idx_v) for one in self._model.joints[1:] if one.nq == one.nv == 1]  # [0]: the world
         driven = (self.stiffness > 0.0) | (self.damping > 0.0)
         freedoms = {k: np.arange(6) + self._model.idx_vs[k] for k in free_roots(self._model)}
         self._roots = [k for k in freedoms if not driven[freedoms[k]].any()]
         self._adrift: Indices = np.concatenate([np.zeros(0, dtype=np.intp), *(freedoms[k] for k in self._roots)])
-        self._limited: Indices = np.array([(joint.idx_q, joint.idx_v) for joint in free], dtype=np.intp).reshape(-1, 2)
+        self._limited: Indices = np.array(single, dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
         compiled_kernel()
 
@@ -119,23 +127,23 @@ class Articulated:
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
-        # an impact with the figure that its program did not foresee ends the step, made again at most twelve times
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
-        most = time
+        most = STEP if self._turning * time > FAR else time
         while True:
-            done, frame = self._attempt(most, time, aim, steady, moved, segments)
+            done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
             angle = turned(self._workspace, figure[0], self.q)
-            far = angle > 0.15  # rad: gaps are not linear in such a way
+            far = angle > FAR or sunk
             if far and done > STEP:
                 most = STEP
-            elif (met or (far and back is None)) and done > SHORTEST and self._stops > 0:
+            elif (met or sunk or (far and back is None)) and done > SHORTEST and self._stops > 0:
                 # what is squeezed meets it again and again
                 self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
                 most = max(SHORTEST, min(0.98 * min(met, default=done), 0.7 * done, 0.14 * done / max(angle, 0.14)))
             else:
                 self.frames += [] if frame is None else [frame]
+                self._turning = angle / done
                 return done
             (self.q, self.velocity, self._old), self.impulses = figure, impulses.copy()
             if back is not None:
@@ -143,8 +151,8 @@ class Articulated:
 
     def _attempt(
         self, time: float, planned: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]
-    ) -> tuple[float, EngineFrame | None]:
-        """A step of at most a time, of `planned` in which things are moved: by how much, and what the things did."""
+    ) -> tuple[float, EngineFrame | None, bool]:
+        """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
         points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
         masses_begun = self._inertia(self.q)
@@ -173,39 +181,28 @@ class Articulated:
         paid = float(motor @ moves + work[points.driven].sum())
         motions = self._move(moves, segments, drifted, np.inf if self.stiffness.any() else began + paid)
         motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
+        again = time > SHORTEST and self._stops > 0
+        ended = points.gap + points.figure[::3] @ moves + time * points.given[::3]
+        if self._sunk(points, ended, time, {name: motions[name][1] for name in moved}) and again:
+            return time, None, True
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
-            return time, None
+            return time, None, False
         held = points.held(bearing)
         energy = engine.energy()
-        again = time > SHORTEST and self._stops > 0
         frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
-        given = frame.wrenches if again else self._left_for_later(frame, segments, energy)
+        given = frame.wrenches if again else left_for_later(engine, frame, segments, energy)
         self._react({name: wrench for name, wrench in given.items() if name in segments}, motions, time, segments)
-        return time, frame
+        return time, frame, False
 
-    def _left_for_later(self, frame: EngineFrame, segments: Mapping[str, int], most: float) -> dict[str, Array]:
-        """The wrenches of a step without its impacts with the figure, which the next step has at its start."""
-        # To the engine it is infinitely heavy, and would bring energy; alternating blows are taken back to `most` [J].
-        wrenches, engine = dict(frame.wrenches), self._engine
-        met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
-        met += [(second, first, -impulse, point) for first, second, impulse, point in met]
-        blows = [blow for blow in met if blow[0] in segments]
-        if engine is None or not blows or not impacts(frame.events, segments, BOUNCE):
-            return wrenches
-
-        def taken_back(share: float) -> float:
-            for _, other, impulse, point in blows:
-                engine.push(other, -share * impulse, point)
-            return engine.energy()
-
-        share = share_below((engine.energy(), taken_back(0.5), taken_back(0.5)), most)
-        if share < 1.0:
-            taken_back(share - 1.0)
-        for own, _, impulse, point in blows:
-            wrenches[own] = wrenches[own] + share * np.hstack([impulse, cross(point, impulse)])
-        return wrenches
+    def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
+        """Whether a step of points that sought gaps (m,) led deeper into what the engine does not keep apart."""
+        self._workspace.place(moved)
+        near = self._workspace.near(self.q, 1e-3, self._own_pairs)
+        self._sag = points.sag(ended, near, time, len(self._sag))
+        began = points.gap[points.pair >= 2 * self._model.nv].min(initial=0.0)
+        return bool(near.distance.min(initial=0.0) < min(-1e-4, began))  # m
 
     def _points(self, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, and the joint limits that it can reach."""
@@ -235,6 +232,7 @@ class Articulated:
         directions = np.concatenate([made.axes, cross(place[:, None], made.axes)], axis=2)
         joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
         made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
+        made.add_flesh(workspace.state, workspace.geometry, self._flesh, near.pair[contact])
         made.restitution[:], made.friction[:] = self._surfaces(owner)
         slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
         slot[bodies] = np.arange(len(bodies))
@@ -266,7 +264,7 @@ class Articulated:
     def _until_impact(self, points: Points, time: float) -> float:
         """The time to the first impact if that comes within a time."""
         speed = self._relative(points)[::3]
-        coming = (speed < -BOUNCE) & (points.gap > SHORTEST * -speed) & (points.restitution > 0.0)
+        coming = (points.restitution * speed < -BOUNCE) & (points.gap > SHORTEST * -speed)
         first = float(((points.gap[coming] - SKIN) / -speed[coming]).min(initial=time))
         if first >= time or self._early <= 0:  # then impacts are part of the program, and do not bounce
             return time
@@ -276,7 +274,7 @@ class Articulated:
     def _bounce(self, inertia: Array, points: Points) -> Array:
         speed = self._relative(points)
         approach = speed[::3]
-        hit = (approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
+        hit = (points.restitution * approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
         if not hit.any():
@@ -293,8 +291,10 @@ class Articulated:
             weights = np.array([self._engine.weight(name) for name in points.bodies])
             falling = time * np.einsum("bij,bj->bi", points.responses[:, :, :3], weights).ravel()
         for again in range(4):
-            room = points.gap - SKIN  # a step removes a fifth of an overlap
-            target = np.where(room >= 0.0, -room / time, np.minimum(-0.2 * room / time, 0.5))  # m/s, at most
+            room = (
+                points.gap + time**2 * self._sag[np.minimum(points.pair, len(self._sag) - 1)] - SKIN
+            )  # a step removes an overlap
+            target = np.where(room >= 0.0, -room / time, np.minimum(-room / time, 0.5))  # m/s, at most
             speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
             found, after = self._solved(inertia, points, speed, target, found)
             # impulses turn joints towards limits that were far away

@@ -15,7 +15,7 @@ and inertia, with what it carries; friction is capped where sliding ends.
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
 from typing import Annotated, NamedTuple
@@ -30,6 +30,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.geometry.flesh import Flesh, spreading
 from wholebody.geometry.pieces import ENDLESS
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
@@ -291,12 +292,38 @@ class Points(NamedTuple):
             given[: len(owner)] += sign * np.einsum("crk,ck->cr", directions, twists[whose])
             self.driven[: len(owner)] |= moving[whose]
 
+    def add_flesh(self, state: State, geometry: pin.GeometryModel, bent: Sequence[Flesh], pieces: Indices) -> None:
+        """Add the motion of flesh beside its limb at the first points, whose pieces are (k, 2)."""
+        for flesh in bent:
+            rows, side = np.nonzero(pieces == flesh.piece)
+            moves = spreading(geometry, flesh, state.data.oMi) if len(rows) else None
+            if moves is not None:
+                wrench = np.concatenate([np.zeros(3), moves.turn])[None]
+                turned = state.rows(wrench, np.array([moves.limb]), np.array([moves.trunk]))[0]
+                for k, sign in zip(rows.tolist(), (2.0 * side - 1.0).tolist(), strict=True):
+                    rate = sign * self.axes[k] @ moves.rate(self.place[k])
+                    self.figure[3 * k : 3 * k + 3] += np.outer(rate, turned)
+
+    def sag(self, ended: Array, near: Contacts, time: float, count: int) -> Array:
+        """By how much pairs, of `count` numbers, came nearer in a step than to the gaps (m,) that it sought, m/s2.
+
+        What rolls does so again in the next step, over the square of its time.
+        """
+        least, found = np.full(count, np.inf), np.zeros(count)
+        np.minimum.at(least, np.minimum(self.pair, count - 1), ended)
+        pair = 2 * self.figure.shape[1] + near.number
+        met = np.isfinite(least[pair])
+        found[pair[met]] = np.minimum(near.distance[met] - least[pair[met]], 0.0) / time**2
+        return found
+
     def with_limits(self, model: pin.Model, limited: Indices, q: Array, reach: Array) -> Points:
         """These and the limits within reaches (nv,) at a posture; of `limited` (k, 2): places in q, in the velocity."""
         at, freedom = limited.T
         room: Array = np.array([q[at] - model.lowerPositionLimit[at], model.upperPositionLimit[at] - q[at]])
         pair = 2 * freedom + np.array([[0], [1]])  # each side of each freedom, before the pairs of pieces
-        side, which = np.nonzero((room < reach[freedom]) & ~np.isin(pair, self.pair))
+        known = np.zeros(2 * model.nv, dtype=bool)
+        known[self.pair[self.pair < len(known)]] = True
+        side, which = np.nonzero((room < reach[freedom]) & ~known[pair])
         if not len(side):
             return self
         more = Points.room(len(side), model.nv, self.bodies, None)
@@ -354,14 +381,3 @@ def drift(
     weight = time * mass * gravity
     way = time / mass * (now.linear + share * weight)
     return now + pin.Force(weight, cross(centre + (1.0 - share) * way, weight)), centre + way
-
-
-def share_below(energies: tuple[float, float, float], most: float) -> float:
-    """Largest share of an impulse with an energy of at most `most` [J]; `energies`: of none, half and all."""
-    none, half, full = energies
-    square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
-    if full <= most or square <= 0.0:
-        return 1.0
-    first = square + none - full
-    root = np.sqrt(max(0.0, first**2 - 4.0 * square * (none - most)))
-    return float(min(max(0.5 * (first + root) / square, 0.0), 1.0))

@@ -24,6 +24,7 @@ class Event(NamedTuple):
         normal: (3,) unit normal from A to B.
         speed: of approach, m/s.
         impulse: (3,) on B, N s; its opposite acts on A.
+        restitution: of their materials.
     """
 
     time: float
@@ -33,6 +34,7 @@ class Event(NamedTuple):
     normal: Array
     speed: float
     impulse: Array
+    restitution: float
 
 
 class EngineFrame(NamedTuple):
@@ -71,8 +73,10 @@ class EngineFrame(NamedTuple):
 
 
 def impacts(events: Sequence[Event], names: Collection[str], speed: float) -> list[Event]:
-    """The impacts with bodies of these names that were faster than a speed, m/s."""
-    return [event for event in events if event.speed > speed and (event.first in names or event.second in names)]
+    """The impacts with bodies of these names whose rebound is faster than a speed, m/s."""
+    # at least 0.2, of wood and people: a blow that does not bounce has an impulse, too
+    fast = (event for event in events if max(0.2, event.restitution) * event.speed > speed)
+    return [event for event in fast if event.first in names or event.second in names]
 
 
 @dataclass
@@ -95,7 +99,7 @@ class FrameRecord:
     given_up: int = 0  # steps that were halved as often as they may be, and still led too deep
 
     def met(self, names: Collection[str], speed: float) -> bool:
-        """Whether an impact with bodies of these names was faster than a speed, m/s."""
+        """Whether an impact with bodies of these names rebounds faster than a speed, m/s."""
         return bool(impacts(self.events, names, speed))
 
     def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:

@@ -200,7 +200,7 @@ class RigidBodies:
             borne: bodies that pushes given before bear during the frame: they move with their velocity at its end.
             yielding: segments whose motion is that of a figure to which their impulses are given after the frame. To
                 contacts they weigh what their joints carry; others of `kinematic` are as heavy as anything.
-            until: ends the frame early, to be taken back, where an impact with those is faster than this, m/s.
+            until: ends the frame early, to be taken back, where the rebound from those is faster than this, m/s.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
         state, names, placed = self.state, *given_placements(kinematic)
@@ -355,7 +355,8 @@ class RigidBodies:
     def _events(self, program: StepProgram, time: float, number: Indices, speed: Array, impulse: Array) -> list[Event]:
         """Impulses (k, 3) on B at points (k,), with speeds (k,) of approach, as events."""
         points, bodies = program.points, program.points.bodies[number].tolist()
-        values = zip(points.point[number], points.normal[number], speed.tolist(), impulse, strict=True)
+        bounce = self._pieces.restitution[points.pair[number]].tolist()
+        values = zip(points.point[number], points.normal[number], speed.tolist(), impulse, bounce, strict=True)
         return [
             Event(time, self.names[first], self.names[second], *each)
             for (first, second), each in zip(bodies, values, strict=True)

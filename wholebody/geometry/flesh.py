@@ -2,7 +2,7 @@
 
 Pinocchio's pieces are rigid. A piece that is marked as flesh is where the geometry model has it as long as its limb is
 bent. Where the limb is straight, it is in the piece before it, which meets things first. In between it goes from one
-place to the other. Contact rows leave this motion out: 16 mm while a hip bends by 30 degrees.
+place to the other. Contact rows leave this motion out: 16 mm while a hip bends by 30 degrees. `Spreading` has it.
 """
 
 from __future__ import annotations
@@ -62,6 +62,43 @@ class Flesh(NamedTuple):
         rows = np.array([np.vstack([at.rotation.T, at.translation]) for at in places])
         spread((Flesh(2, NUMBERS + 6, column, self.sign),), rows, rows.reshape(-1))
         return pin.SE3(rows[2, :3].T, rows[2, 3])
+
+
+class Spreading(NamedTuple):
+    """How flesh moves beside its limb at a posture.
+
+    The share of the way to where it is of a bent limb changes by `turn` . (w_limb - w_trunk), angular velocities.
+    """
+
+    turn: Array  # (3,) a radian
+    limb: int  # joint
+    trunk: int  # joint
+    joint: pin.SE3  # where the limb's joint is
+    now: pin.SE3  # of the flesh in it
+    way: Array  # (4, 3) from where it is of a straight limb to where it is of a bent one, columns and translation
+
+    def rate(self, point: Array) -> Array:
+        """By how much a point (3,) of the flesh in the world moves with the share, (3,) metres."""
+        local = self.now.actInv(self.joint.actInv(point))
+        return np.asarray(self.joint.rotation @ (local @ self.way[:3] + self.way[3]))
+
+
+def spreading(geometry: pin.GeometryModel, flesh: Flesh, joints: Any) -> Spreading | None:
+    """How flesh moves, with the joints at Pinocchio's placements; None where the limb is straight or bent."""
+    number, column = divmod(flesh.trunk, NUMBERS)
+    trunk, straight, bent = (geometry.geometryObjects[k] for k in (number, flesh.piece - 1, flesh.piece))
+    joint = joints[bent.parentJoint]
+    axis = (joints[trunk.parentJoint] * trunk.placement).rotation[:, column // 3]
+    own = (joint * straight.placement).rotation[:, 2]
+    share = (STRAIGHT - flesh.sign * float(axis @ own)) / (STRAIGHT - BENT)
+    if not 0.0 < share < 1.0:
+        return None
+    turn = -6.0 * share * (1.0 - share) / (STRAIGHT - BENT) * flesh.sign * cross(own, axis)
+    ends = [np.vstack([one.placement.rotation.T, one.placement.translation]) for one in (straight, bent)]
+    now = between(ends[0], ends[1], share * share * (3.0 - 2.0 * share))
+    return Spreading(
+        turn, int(bent.parentJoint), int(trunk.parentJoint), joint, pin.SE3(now[:3].T, now[3]), ends[1] - ends[0]
+    )
 
 
 def spread(flesh: tuple[Flesh, ...], placed: Array, flat: Any) -> None:
