@@ -203,8 +203,8 @@ def _turns(
 def turning(motion: SkeletonMotion, roles: Roles) -> set[str]:
     """Roles whose joints' axes turn with the body; those of skeletons of places alone do not, and say nothing.
 
-    A joint's axes turn with the body where bones of constant length have in them, and in those of the joints before,
-    the directions of the rest posture.
+    A joint's axes turn with the body where bones of constant length have the directions of the rest posture in them,
+    and where they have these in the pelvis's axes.
     """
     used = set[int]()
     for name in roles.joints.values():
@@ -220,13 +220,10 @@ def turning(motion: SkeletonMotion, roles: Roles) -> set[str]:
         if min(rest, lengths.min()) > SMALL and lengths.std() < 0.1 * lengths.mean():  # else it moves along itself
             there = motion.rotations[:, parent] @ (motion.offsets[joint] / rest)
             alike[parent].append(float((bone / lengths[:, None] * there).sum(axis=1).mean()))
-    found = set[str]()
-    for role, name in roles.joints.items():
-        joint, turns = motion.names.index(name), True
-        while joint >= 0:
-            turns, joint = turns and min(alike[joint], default=1.0) > ALIKE, int(motion.parents[joint])
-        found |= {role} if turns else set()
-    return found
+    like = {joint: min(cosines, default=1.0) > ALIKE for joint, cosines in alike.items()}
+    whole = like[motion.names.index(roles.joints["pelvis"])] if "pelvis" in roles.joints else like[0]
+    at = {role: motion.names.index(name) for role, name in roles.joints.items()}
+    return {role for role, k in at.items() if whole and like[motion.parents[k] if role.endswith("hand") else k]}
 
 
 def has_trunk(roles: Collection[str]) -> bool:
