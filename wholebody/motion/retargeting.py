@@ -51,7 +51,8 @@ from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
 # a clip that overlaps so, or whose points jerk by so many times what those of the free fit do and by so much [m/s³], is
-# stuck at an edge that it should pass on the other side: then it is sought once more, from frames so far apart [s]
+# stuck at an edge that it should pass on the other side: then it is sought once more, from frames so far apart [s], and
+# of both the one is kept that has the least product of errors of bones and of by how many times it is beyond these
 JERKS, LEAST_JERK, COARSE = 3.0, 50.0, 4.0 * SPAN
 
 
@@ -163,8 +164,10 @@ def retarget(
                 q = _held(run, holds, frames, all(one.base for one in contacts), progress)
                 depths = _depths(alone.fitter, holds, q)
                 most = max(JERKS * alone.jerk(alone.free), LEAST_JERK)
-                tries.append((max(alone.jerk(q) / most, depths.max() / DEEP), q, depths, holds))
-                if tries[-1][0] < 1.0:
+                over = max(1.0, alone.jerk(q) / most, depths.max() / DEEP)
+                bones = list(errors_of(motion, Clip(figure, q, motion.dt), roles, found).values())
+                tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
+                if over == 1.0:
                     break
             _, q, depths, holds = min(tries, key=lambda one: one[0])
             lost = holds.let_go(q)
