@@ -191,7 +191,7 @@ class Run:
                 values.pop(frame, None)
         return found
 
-    def jerk(self, postures: Sequence[Array]) -> float:
+    def jerk(self, postures: Sequence[Array] | Array) -> float:
         """Root mean square of the jerk of the points over postures (nq,), m/s³."""
         if len(postures) < 4:
             return 0.0

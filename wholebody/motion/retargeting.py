@@ -50,10 +50,10 @@ from wholebody.motion.thing_contacts import (
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
-# a clip that overlaps so, or whose points jerk by so many times what those of the free fit do and by so much [m/s³], is
-# stuck at an edge that it should pass on the other side: then it is sought once more, from frames so far apart [s], and
-# of both the one is kept that has the least product of errors of bones and of by how many times it is beyond these
-JERKS, LEAST_JERK, COARSE = 3.0, 50.0, 4.0 * SPAN
+# a clip whose points jerk so many times as those of the free fit, and so much [m/s³], or that overlaps so, is beyond
+# what it should be; so many times beyond, it is stuck at an edge, and is sought once more from frames so far apart [s].
+# Of both the one is kept with the least product of errors of bones and of how many times it is beyond
+JERKS, LEAST_JERK, STUCK, COARSE = 3.0, 50.0, 2.0, 4.0 * SPAN
 
 
 def retarget(
@@ -167,7 +167,7 @@ def retarget(
                 over = max(1.0, alone.jerk(q) / most, depths.max() / DEEP)
                 bones = list(errors_of(motion, Clip(figure, q, motion.dt), roles, found).values())
                 tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
-                if over == 1.0:
+                if over < STUCK:
                     break
             _, q, depths, holds = min(tries, key=lambda one: one[0])
             lost = holds.let_go(q)
