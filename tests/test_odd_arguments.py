@@ -687,6 +687,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Retargeter.push", Call(lambda motion: wb.motion.Retargeter(**fed).push(motion), {"motion": skeleton})
     yield "Retargeter.finish", Call(wb.motion.Retargeter(**fed).finish, {})
     errors = {"motion": skeleton, "clip": wb.retarget(skeleton, arm, names=bones), "names": bones}
+    errors["scene"] = wb.Scene(arm)
     yield "bone_errors", Call(wb.motion.bone_errors, errors)
     named = {"skeleton": {"left_ankle": "a"}, "figure": {"left_ankle": "link4"}}
     yield "ground", Call(wb.motion.ground, {"motion": skeleton, "names": named, "scene": wb.Scene(arm)}, str)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 
 import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.motion.test_ground import flat, walker
 from wholebody.motion.retargeting import said_of
 from wholebody.motion.skeleton import SkeletonMotion
 
@@ -49,6 +51,25 @@ def test_a_figure_that_cannot_follow_is_told(human: wb.Figure) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert max(map(np.max, wb.motion.bone_errors(motion, clip, NAMES).values())) == pytest.approx(1.2)
+
+
+def test_the_feet_of_who_hangs_in_a_scene_are_not_flat(human: wb.Figure) -> None:
+    """The left foot rests on what the scene does not have, toes down: its sole is flat without the scene alone."""
+    motion, _ = walker(flat, 3.0)
+    at, foot = np.repeat(motion.positions[:1], 90, axis=0), motion.names.index("left_foot")
+    at[:, [foot, foot - 1, foot - 2], 2] += 0.3 + 0.25 * np.abs(np.linspace(-1.0, 1.0, 90))[:, None] ** 8
+    at[:, foot, 2] -= 0.05
+    raised = dataclasses.replace(motion, positions=at)
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    clip = wb.Clip(human, np.array([human.neutral] * 90), motion.dt)
+    found = wb.motion.bone_errors(raised, clip, scene=scene)["left_ankle to left_toe"]
+    ends = [human.placement(human.neutral, f"left_{part}").translation for part in ("ankle", "toes")]
+    recorded = np.arctan2(at[:, foot, 2] - at[:, foot - 1, 2], at[:, foot, 0] - at[:, foot - 1, 0])
+    (x, _, z) = ends[1] - ends[0]
+    assert found == pytest.approx(np.abs(recorded - np.arctan2(z, x)), abs=1e-3)
+    assert wb.motion.bone_errors(raised, clip)["left_ankle to left_toe"].max() < 1e-3
+    with pytest.raises(wb.InputError, match="several figures"):
+        wb.motion.bone_errors(raised, clip, scene=wb.Scene({"a": human, "b": human}))
 
 
 @pytest.mark.parametrize("bend", [0.4, 1.8])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.motion.test_ground import DT, flat, walker
 from tests.motion.test_retargeting import angles, person, places
+from wholebody.motion import retargeting
 from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.thing_contacts import own_rests
 
@@ -149,3 +151,35 @@ def test_a_motion_through_a_panel_between_two_free_frames_is_told(human: wb.Figu
     check = wb.check(clip, scene)
     assert check.colliding == 0
     assert check.between[6] > 0.05
+
+
+def test_a_skeleton_of_places_alone_faces_where_its_hips_do(human: wb.Figure) -> None:
+    """Its axes stay as they are in a rest posture that stands, while the person turns round by 180 degrees."""
+    count = 30
+    still = dataclasses.replace(person(count, 1.1), dt=0.1)
+    turns = np.array([pin.utils.rotate("z", np.pi * k / count) for k in range(count)])
+    clip = wb.retarget(dataclasses.replace(still, positions=np.einsum("nij,nkj->nki", turns, still.positions)), human)
+    left = [places(clip, f"{side}_hip") for side in ("right", "left")]
+    away = angles(left[1] - left[0], turns[:, :, 1])
+    assert away.max() < 15.0
+    chest = np.array([human.placement(q, "thorax").rotation for q in clip.q])  # turns with the hips, not against them
+    assert angles(chest[:, :, 1], turns[:, :, 1]).max() < 15.0
+
+
+def test_a_clip_that_is_stuck_is_sought_again_from_fewer_frames(
+    human: wb.Figure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, _ = walker(flat, 1.0)
+    usual, measured, calls = wb.retarget(motion, human), retargeting._depths, list[float]()
+
+    def depths(*given: Any) -> np.ndarray:
+        calls.append(0.0)
+        return measured(*given) + (0.01 if len(calls) == 1 else 0.0)  # as if the first one overlapped by 10 mm
+
+    with monkeypatch.context() as patched:
+        patched.setattr(retargeting, "_depths", depths)
+        again = wb.retarget(motion, human)
+    monkeypatch.setattr(retargeting, "SPAN", retargeting.COARSE)
+    assert len(calls) == 2
+    assert np.array_equal(again.q, wb.retarget(motion, human).q)
+    assert not np.array_equal(again.q, usual.q)

@@ -35,6 +35,7 @@ BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
+SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
 
 
@@ -111,13 +112,15 @@ class Holds:
         dt: float,
         surface: Surface | None,
         touched: Touched | None = None,
+        span: float = SPAN,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
+        # `span` [s] is between the frames of the first pass and sweeps at most.
         # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
-        self._dt = dt
+        self._dt, self.span = dt, span
         contacts = () if touched is None else touched.contacts
         self.touches = bool(contacts)  # whether parts touch things, or each other
         # a part that touches a thing while it seems to rest on the ground rests on the thing

@@ -19,7 +19,7 @@ last sweeps have contact rows there too, and so have sweeps after them of the fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -42,7 +42,6 @@ FIRST, FREE, FORWARD, SWEEP = 60, 2, 3, 1
 EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
-SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 SWEEPS: tuple[float, ...] = (1.8, 1.7, 1.6, 1.4, 1.2, 1.0)  # omega of each; more: less jerk, and slower by a tenth each
 FINER: tuple[float, ...] = (1.4, 1.2, 1.0)  # the same of sweeps over twice as many frames
 STAY = 0.03  # m/rad from the neutral posture of a person, for what no goal determines
@@ -93,7 +92,9 @@ class Run:
         self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
-        self.span = 2 ** int(max(0.0, np.log2(SPAN / dt)))  # frames between those of the first pass and first sweeps
+        self.span = 2 ** int(
+            max(0.0, np.log2((holds.span if holds else dt) / dt))
+        )  # frames between those of the first pass and first sweeps
         self.even, self.calm, self.spread = normal(EVEN, dt), normal(CALM, dt), normal(SPREAD, self.span * dt)
         # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
         # points that may be held, deviations of the first pass, what is held in sweeps, postures, deviations of the
@@ -189,6 +190,13 @@ class Run:
             for frame in range(given - KEPT, come - KEPT):
                 values.pop(frame, None)
         return found
+
+    def jerk(self, postures: Sequence[Array] | Array) -> float:
+        """Root mean square of the jerk of the points over postures (nq,), m/s³."""
+        if len(postures) < 4:
+            return 0.0
+        steps = np.diff(np.array([self.fitter.places(q) for q in postures]), 3, axis=0)
+        return float(((steps**2).sum(axis=2).mean()) ** 0.5 / self.dt**3)
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
         wanted = self._wanted[frame]

@@ -143,6 +143,7 @@ class Proportions:
         self._joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
         self._soles = soles(motion, roles, ground.rests, places)
         self._flat = flat_turns(motion, roles, ground.rests)
+        self._turning = turning(motion, roles)
         own = self._own
         self._source = source = _Body(self._centres(motion))
         self._scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
@@ -162,6 +163,7 @@ class Proportions:
         """Goals of all frames of a motion of the same skeleton; `under` (n,) heights of the ground below it, metres."""
         own, source = self._own, _Body(self._centres(motion), self._source)
         turns = _turns(motion, self._joint, own, self._turned, self._axes, self._flat)
+        turns = {role: turn for role, turn in turns.items() if role in self._turning}
         root = turns.get("pelvis", _pelvis(source, motion))
         if self._fixed:  # only what moves relative to the pelvis can be followed
             back = np.swapaxes(root, 1, 2)
@@ -196,6 +198,32 @@ def _turns(
         if turn is not None:
             turns[f"{side}_hand"] = turn @ _hand_axes(own, side).T @ turned[f"{side}_hand"]
     return turns
+
+
+def turning(motion: SkeletonMotion, roles: Roles) -> set[str]:
+    """Roles whose joints' axes turn with the body; those of skeletons of places alone do not, and say nothing.
+
+    A joint's axes turn with the body where bones of constant length have the directions of the rest posture in them,
+    and where they have these in the pelvis's axes.
+    """
+    used = set[int]()
+    for name in roles.joints.values():
+        joint = motion.names.index(name)
+        while joint not in used and joint >= 0:
+            used.add(joint)
+            joint = int(motion.parents[joint])
+    alike: dict[int, list[float]] = {joint: [] for joint in used}
+    for joint in used - {0}:
+        parent, rest = int(motion.parents[joint]), np.linalg.norm(motion.offsets[joint])
+        bone = motion.positions[:, joint] - motion.positions[:, parent]
+        lengths = np.linalg.norm(bone, axis=1)
+        if min(rest, lengths.min()) > SMALL and lengths.std() < 0.1 * lengths.mean():  # else it moves along itself
+            there = motion.rotations[:, parent] @ (motion.offsets[joint] / rest)
+            alike[parent].append(float((bone / lengths[:, None] * there).sum(axis=1).mean()))
+    like = {joint: min(cosines, default=1.0) > ALIKE for joint, cosines in alike.items()}
+    whole = like[motion.names.index(roles.joints["pelvis"])] if "pelvis" in roles.joints else like[0]
+    at = {role: motion.names.index(name) for role, name in roles.joints.items()}
+    return {role for role, k in at.items() if whole and like[motion.parents[k] if role.endswith("hand") else k]}
 
 
 def has_trunk(roles: Collection[str]) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -16,10 +17,11 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
+from wholebody.motion.carrying import as_carried, at_start, brought_back, carrier
 from wholebody.motion.clip import Clip, thing_tracks
 from wholebody.motion.files.base import check_one
 from wholebody.motion.held_points import held_points, touching_points
-from wholebody.motion.holds import Holds, Touched
+from wholebody.motion.holds import SPAN, Holds, Touched
 from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
@@ -35,7 +37,6 @@ from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import NOTHING, Ground, ground_on
-from wholebody.motion.standing_ground import ground as find_ground
 from wholebody.motion.structure import LIMBS
 from wholebody.motion.surfaces import Surface, surface_of
 from wholebody.motion.thing_contacts import (
@@ -49,6 +50,10 @@ from wholebody.motion.thing_contacts import (
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
+# a clip whose points jerk so many times as those of the free fit, and so much [m/s³], or that overlaps so, is beyond
+# what it should be; so many times beyond, it is stuck at an edge, and is sought once more from frames so far apart [s].
+# Of both the one is kept with the least product of errors of bones and of how many times it is beyond
+JERKS, LEAST_JERK, STUCK, COARSE = 3.0, 50.0, 2.0, 4.0 * SPAN
 
 
 def retarget(
@@ -103,6 +108,15 @@ def retarget(
     function(progress, "progress")
     if scene is not None:
         same_figure(instance(scene, Scene, "retarget: scene", "make one with wb.Scene(figure)"), figure)
+    tracks = _tracks(motion, scene, things)
+    surface = None if scene is None else surface_of(scene, tracks)
+    if scene is not None and tracks and ground is not None and not isinstance(ground, Ground) and figure.root == "free":
+        still_ground, joints = ground_on(motion, names, surface), skeleton_roles(motion, names)
+        if on := carrier(motion, joints, scene, tracks, still_ground):
+            seen, others = as_carried(motion, scene, tracks, on)
+            there = at_start(scene, {on: tracks[on]})
+            clip = retarget(seen, figure, there, ground, things=others, names=names, progress=progress)
+            return brought_back(clip, tracks[on], tracks)
     roles = matched(motion, figure, names)
     if roles.by_structure:
         known = ", ".join(f"{role} is {roles.joints[role]!r}" for role in roles.by_structure)
@@ -113,8 +127,6 @@ def retarget(
             f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
             'name them by names= (or --names FILE.toml): a table "skeleton" with left_wrist = "hand.L"'
         )
-    tracks = _tracks(motion, scene, things)
-    surface = None if scene is None else surface_of(scene, tracks)
     found = checked_ground(motion, figure, ground, names, surface)
     # without things but floors, the paths of moving things are scaled like the figure's own path
     still = [] if scene is None else [name for name in still_things(scene) if name not in tracks]
@@ -144,20 +156,22 @@ def retarget(
             parts = ((one.role, one.share, one.base) for one in contacts)
             points = held_points(figure, roles, held) + touching_points(figure, roles, motion, parts, joints)
             touched = Touched(figure, Things(world, tracks), contacts)
-            holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
-            # places on things are sought as bodies come to them; a hand on the own body is known after a first pass
-            ahead = all(one.base for one in contacts)
-            for _ in range(2):  # the second time around what the first one could not reach
-                run = Run(figure, wanted, roles, motion.dt, holds, workspace, alone.free)
-                if ahead:
-                    run.pass_first(frames)
-                else:
-                    q = _postures(run, frames, progress, 0.3)
-                if not holds.give_up():
+            tries = list[tuple[float, Array, Array, Holds]]()
+            for span in (SPAN, COARSE):
+                holds = Holds(points, held, proportions.path, motion.dt, surface, touched, span)
+                run = partial(Run, figure, wanted, roles, motion.dt, holds, workspace, alone.free)
+                # places on things are sought as bodies come to them; a hand on the own body after a first pass
+                q = _held(run, holds, frames, all(one.base for one in contacts), progress)
+                depths = _depths(alone.fitter, holds, q)
+                most = max(JERKS * alone.jerk(alone.free), LEAST_JERK)
+                over = max(1.0, alone.jerk(q) / most, depths.max() / DEEP)
+                bones = list(errors_of(motion, Clip(figure, q, motion.dt), roles, found).values())
+                tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
+                if over < STUCK:
                     break
-            q = _advanced(run, len(frames), progress) if ahead else q
+            _, q, depths, holds = min(tries, key=lambda one: one[0])
             lost = holds.let_go(q)
-            inside = _said_inside(alone.fitter, holds, q)
+            inside = _said_inside(alone.fitter, holds, q, depths)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
     if lost:
         warn(f"retarget: {motion.name}: {lost}, which it lets go of there; things keep their places and sizes")
@@ -191,8 +205,23 @@ def _advanced(run: Run, count: int, tell: Callable[[float], object] | None) -> A
     return np.array(found)
 
 
-def _said_inside(fitter: Fitter, holds: Holds, q: Array) -> str:
-    """What is known of frames (n, nq), and middles of motions to the next, that overlap deeply; empty without one."""
+def _held(
+    make: Callable[[], Run], holds: Holds, frames: list[Wanted], ahead: bool, tell: Callable[[float], object] | None
+) -> Array:
+    """Postures (n, nq) of all frames with holds; `ahead`: what is out of reach is known after a first pass."""
+    for _ in range(2):  # the second time around what the first one could not reach
+        run = make()
+        if ahead:
+            run.pass_first(frames)
+        else:
+            q = _postures(run, frames, tell, 0.3)
+        if not holds.give_up():
+            break
+    return _advanced(run, len(frames), tell) if ahead else q
+
+
+def _depths(fitter: Fitter, holds: Holds, q: Array) -> Array:
+    """How deep frames (n, nq), and middles of motions to the next, overlap (n, 2), metres."""
     ways = [pin.interpolate(fitter.model, *ends, 0.5) for ends in pairwise(q)]
     depths = np.zeros((len(q), 2))
     for frame, posture in enumerate(q):
@@ -200,11 +229,17 @@ def _said_inside(fitter: Fitter, holds: Holds, q: Array) -> str:
         depths[frame, 0] = fitter.depth(posture)
         if frame < len(ways) and not holds.moved(frame):
             depths[frame, 1] = fitter.depth(ways[frame])
+    return depths
+
+
+def _said_inside(fitter: Fitter, holds: Holds, q: Array, depths: Array) -> str:
+    """What is known of frames (n, nq), and middles of motions to the next, that overlap deeply; empty without one."""
     worst, late = np.unravel_index(int(depths.argmax()), depths.shape)
     if depths.max() < DEEP:
         return ""
     fitter.see(holds.moved(int(worst)))
-    first, second = fitter.deepest(ways[worst] if late else q[worst])
+    deep = pin.interpolate(fitter.model, q[worst], q[worst + 1], 0.5) if late else q[worst]
+    first, second = fitter.deepest(deep)
     return (
         f"{(depths.max(axis=1) >= DEEP).sum()} of {len(q)} frames, or motions to the next, overlap by "
         f"{1e3 * DEEP:.0f} mm or more, most of all {first} and {second} by {1e3 * depths.max():.0f} mm "
@@ -257,11 +292,11 @@ def same_figure(scene: Scene, figure: Figure) -> None:
     if scene.figure.root == "several":
         name = next(iter(scene.figure.bodies)).rstrip("/")
         raise InputError(
-            "retarget: the scene has several figures; leave it out, move the clip's free root to where the figure "
+            "the scene has several figures; leave it out, move the clip's free root to where the figure "
             f"stands, join the postures by figure.posture({{{name!r}: q, ...}}), and free the clip of all by avoid"
         )
     if scene.figure.joints != figure.joints or scene.model.nq != figure.model.nq:
-        raise InputError(f"retarget: the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
+        raise InputError(f"the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
 
 
 def checked_ground(
@@ -290,6 +325,7 @@ def bone_errors(
     motion: SkeletonMotion,
     clip: Clip,
     names: str | os.PathLike[str] | Mapping[str, Mapping[str, str]] | None = None,
+    scene: Scene | None = None,
 ) -> dict[str, Array]:
     """The angle (n,) in radians between each bone of a skeleton and that of a figure, by the bone's two ends.
 
@@ -297,13 +333,15 @@ def bone_errors(
         motion: the skeleton.
         clip: the motion of the figure, from `retarget`, frame by frame the same.
         names: as for `retarget`.
+        scene: the one of `retarget`: what its feet stand on says where their soles are flat.
 
     Returns:
         Errors by names such as "left_shoulder to left_elbow"; a bone without both ends, or without a length, has none.
         Those of feet are between soles: skeletons have ankles and toes at other heights above them.
 
     Raises:
-        InputError: the clip has another number of frames, or no bones are known to belong to the figure.
+        InputError: the clip has another number of frames, no bones are known to belong to the figure, or the scene is
+            of another figure.
 
     Examples:
         >>> errors = wb.motion.bone_errors(skeleton, wb.retarget(skeleton, human))
@@ -314,8 +352,11 @@ def bone_errors(
         raise InputError(
             f"bone_errors: the clip has {len(clip)} frames and the motion {len(motion)}; give its own clip"
         )
+    if scene is not None:
+        same_figure(instance(scene, Scene, "bone_errors: scene", "give that of wb.retarget"), clip.figure)
     roles = matched(motion, clip.figure, names)
-    return errors_of(motion, clip, roles, find_ground(motion, {"skeleton": roles.joints}))
+    surface = None if scene is None else surface_of(scene, clip.things)
+    return errors_of(motion, clip, roles, ground_on(motion, {"skeleton": roles.joints}, surface))
 
 
 def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles, ground: Ground) -> dict[str, Array]:

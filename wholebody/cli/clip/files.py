@@ -78,7 +78,7 @@ def retarget_motions(arguments: argparse.Namespace) -> int:
             None if arguments.ground == "none" else "auto", things=tracks, names=arguments.names,
             progress=lambda share: tell(share, "retargeting"),
         )  # fmt: skip
-    _print_errors(bone_errors(motion, clip, arguments.names))
+    _print_errors(bone_errors(motion, clip, arguments.names, None if arguments.scene is None else scene))
     if arguments.html is not None:
         page = motion_curves(motion, {"retargeted": clip}, scene, arguments.names)
         print(f"wrote {write(arguments.html, page)}")

@@ -1,0 +1,68 @@
+"""People who stand on things that move: a made-up person on a lift that goes up, turns and leans."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from tests.motion.test_retargeting import person
+from wholebody.motion.carrying import carrier
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.surfaces import surface_of
+
+COUNT = 24
+
+
+def ridden(turns: bool, off: bool = False) -> tuple[SkeletonMotion, np.ndarray]:
+    """Somebody who stands on a lift of 0.5 m/s, and where it is; `off`: it leaves without them in the middle."""
+    motion, seconds = person(COUNT), np.arange(COUNT) / 30
+    ways = [
+        pin.SE3(
+            pin.utils.rotate("z", 0.5 * time * turns) @ pin.utils.rotate("x", 0.1 * np.sin(3.0 * time) * turns),
+            0.5 * max(time - 0.4 * off, 0.0) * np.array([0.6, 0.0, 0.8]),
+        )
+        for time in seconds
+    ]
+    goes = motion if off else replace(
+        motion,
+        positions=np.array([[way.act(at) for at in row] for way, row in zip(ways, motion.positions, strict=True)]),
+        rotations=np.array([way.rotation @ row for way, row in zip(ways, motion.rotations, strict=True)]),
+    )  # fmt: skip
+    start = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.05]))
+    return replace(goes, dt=1 / 30), np.array([pin.SE3ToXYZQUAT(way * start) for way in ways])
+
+
+def among(figure: wb.Figure) -> wb.Scene:
+    scene = wb.Scene(figure).add(wb.Box((1.0, 1.0, 0.1)), name="lift", at=(0.0, 0.0, -0.05))
+    return scene.add(wb.Box((0.2, 0.2, 0.2)), name="post", at=(3.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_feet_rest_on_a_lift_that_moves(turns: bool) -> None:
+    human = wb.load("human", stature=1.5)  # smaller than the recorded person
+    motion, track = ridden(turns)
+    clip = wb.retarget(motion, human, scene := among(human), things={"lift": track})
+    assert clip.things["lift"] == pytest.approx(track, abs=1e-12)
+    for name in ("left_heel", "right_heel", "left_toe_tip", "right_toe_tip"):
+        path = [
+            pin.XYZQUATToSE3(at).actInv(human.placement(q, name).translation)
+            for q, at in zip(clip.q, track, strict=True)
+        ]
+        assert np.ptp(path, axis=0).max() < 1e-3
+        assert np.abs(np.array(path)[:, 2] - 0.05).max() < 2e-3
+    assert wb.check(clip, scene).colliding == 0
+
+
+def test_who_is_left_by_a_lift_does_not_go_with_it(human: wb.Figure) -> None:
+    """As the lift leaves, the feet stay on the floor beneath: they do not go with the lift alone."""
+    for off in (False, True):
+        motion, track = ridden(turns=False, off=off)
+        scene, joints = among(human).add(wb.HalfSpace(), name="floor"), {name: name for name in motion.names}
+        joints |= {f"{side}_toe": f"{side}_foot" for side in ("left", "right")}
+        ground = wb.motion.ground(motion, scene=scene)
+        assert surface_of(scene, {"lift"})(np.array([0.0, 0.0, 1.0])) == pytest.approx(0.0, abs=1e-5)
+        assert carrier(motion, joints, scene, {"lift": track}, ground) == ("" if off else "lift")

@@ -1,0 +1,97 @@
+"""A recorded person who stands on a thing that moves, such as a lift, a tram or a swing.
+
+As seen from the thing the person stands still: in its axes feet rest as on a floor, and what stands in the world moves
+the other way. So a recording is brought into the world where the thing stays at its first place, and the clip back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Mask
+from wholebody.motion.clip import Clip
+from wholebody.motion.footholds import RestLimits
+from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.standing_ground import Ground
+from wholebody.motion.surfaces import surface_of
+from wholebody.motion.thing_contacts import Things, still_things
+from wholebody.scene.scene import Scene
+
+ON = 0.2  # m: as far above what a foot stands on are its ankle and toes at most
+
+
+def carrier(
+    motion: SkeletonMotion, joints: Mapping[str, str], scene: Scene, tracks: Mapping[str, Array], ground: Ground
+) -> str:
+    """The moving thing on which alone a person stands, by `joints` of roles; "" for none.
+
+    `ground` is what still surfaces bear: feet that rest there too make a person who steps on or off.
+    """
+    things = Things(scene, tracks)
+    for name, track in tracks.items():
+        if not np.ptp(track, axis=0).max() > RestLimits().height:  # it stays where it is
+            continue
+        bears: Mask = np.zeros(len(motion), dtype=bool)
+        rests: Mask = np.zeros(len(motion), dtype=bool)
+        start = things.at(name, 0)
+        surface = surface_of(at_start(scene, {name: track}), [other for other in scene.objects if other != name])
+        for role in (f"{side}_{part}" for side in ("left", "right") for part in ("ankle", "toe")):
+            if role not in joints:
+                continue
+            path = motion.positions[:, motion.names.index(joints[role])]
+            touched = things.touched(name, path, ON, motion.dt)
+            local = things.within(name, path)
+            for frame in np.flatnonzero(touched):
+                place = np.array(start.act(local[frame]))
+                below = surface(place)
+                bears[frame] |= below is not None and place[2] - below <= ON
+            rests |= ground.rests.get(role, np.zeros(len(motion), dtype=bool))
+        if bears.any() and not (rests & ~bears).any():
+            return name
+    return ""
+
+
+def at_start(scene: Scene, tracks: Mapping[str, Array]) -> Scene:
+    """A scene whose things are where they are in the first frame of their tracks (n, 7)."""
+    found = scene.__copy__()
+    for name, track in tracks.items():
+        found.move(name, at=pin.XYZQUATToSE3(track[0]))
+    return found
+
+
+def ways_back(track: Array) -> list[pin.SE3]:
+    """From the world in which a thing with a track (n, 7) stays at its first place to the world, frame by frame."""
+    start = pin.XYZQUATToSE3(track[0]).inverse()
+    return [pin.XYZQUATToSE3(one) * start for one in track]
+
+
+def as_carried(
+    motion: SkeletonMotion, scene: Scene, tracks: Mapping[str, Array], name: str
+) -> tuple[SkeletonMotion, dict[str, Array]]:
+    """A recording, and tracks (n, 7) of what else there is but floors, where a thing stays at its first place."""
+    back = ways_back(tracks[name])
+    turns, places = (np.array([getattr(way, part) for way in back]) for part in ("rotation", "translation"))
+    seen = replace(
+        motion,
+        positions=np.einsum("nji,nkj->nki", turns, motion.positions - places[:, None]),
+        rotations=np.einsum("nji,nkjl->nkil", turns, motion.rotations),
+    )
+    still = {other: scene.objects[other].placement for other in still_things(scene) if other not in tracks}
+    placed = {other: [pin.XYZQUATToSE3(one) for one in track] for other, track in tracks.items() if other != name}
+    placed |= {other: [at] * len(motion) for other, at in still.items()}
+    return seen, {
+        other: np.array([pin.SE3ToXYZQUAT(way.actInv(at)) for way, at in zip(back, track, strict=True)])
+        for other, track in placed.items()
+    }
+
+
+def brought_back(clip: Clip, track: Array, tracks: Mapping[str, Array]) -> Clip:
+    """A clip of a figure on a thing that stayed, where the thing moves; with the tracks (n, 7) of all that moves."""
+    q = np.array(clip.q)
+    for posture, way in zip(q, ways_back(track), strict=True):
+        posture[:7] = pin.SE3ToXYZQUAT(way * pin.XYZQUATToSE3(posture[:7]))
+    return Clip(clip.figure, q, clip.dt, clip.name, dict(tracks))
