@@ -18,9 +18,6 @@ from wholebody.methods.qp.settings import SEEDS
 from wholebody.scene.workspace import Workspace
 
 
-TOGETHER = 8  # samples whose branches are followed at once; more: less of each is in Python, more of what is not needed
-
-
 class Look(NamedTuple):
     """A posture along a branch."""
 
@@ -45,9 +42,10 @@ class Along(NamedTuple):
         """The free posture of least effort, if that is less than `most`; the first one where no effort counts."""
         best, measured, held, blocked = None, bool(self.nearest[1].any()), self.chain.held, -1
         order, ways = self.chain.downhill(branches, most)
-        for begin in range(0, len(order), TOGETHER):
-            some = order[begin : begin + TOGETHER]
-            samples, towards = branches.values[some], ways[begin : begin + TOGETHER, 0].copy()
+        together = 8  # of which branches are followed at once; more: less time in Python, more for what is not needed
+        for begin in range(0, len(order), together):
+            some = order[begin : begin + together]
+            samples, towards = branches.values[some], ways[begin : begin + together, 0].copy()
             ends, efforts = self._along(samples, towards, most)
             for k, (first, last) in enumerate(efforts.tolist()):
                 if ways[begin + k, 1] >= most:

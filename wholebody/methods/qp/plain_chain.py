@@ -276,8 +276,8 @@ def compiled_kernel(_: Any) -> None:
         bodies, np.zeros(5), (np.zeros((0, 0, 36)), entries), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
         np.zeros(0, dtype=np.intp),
     )  # fmt: skip
-    one_arm, goals = with_values(_NO_ARM, axes=axis, points=axis, joints=joint, held=0), Goals(np.zeros((1, 36)), entries)
-    efforts = np.empty((0, 2))
+    one_arm = with_values(_NO_ARM, axes=axis, points=axis, joints=joint, held=0)
+    goals, efforts = Goals(np.zeros((1, 36)), entries), np.empty((0, 2))
     branch_kernel.downhill(np.zeros((2, BRANCHES)), np.zeros((2, BRANCHES)), 0.0, joint, efforts)
     branch_kernel.along(
         (chain, one_arm, room), True, np.zeros(5), goals, np.zeros((2, 1)), (0.0, 0.0, 0), axis[:0, :1].copy(),
