@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -52,7 +54,8 @@ def test_ends_of_branches_that_come_below_nothing_are_not_sought(seed: int, monk
 def test_a_branch_is_followed_as_far_as_it_exists() -> None:
     """Its ends meet the goal by Pinocchio's kinematics, and a step of the held joint beyond the last one does not."""
     problem, _ = robots.free(robots.of_known.arms.index("panda"), np.random.default_rng(3))
-    figure, place = problem.scene.figure, problem.goals[0].residual.placement
+    goal: Any = problem.goals[0]
+    figure, place = problem.scene.figure, goal.residual.placement
     with chains_of(problem).borrow() as chains:
         chain = chains.carrying(goal_entries(problem) or [])
         assert chain is not None
