@@ -60,14 +60,14 @@ def downhill(effort: Array, held: Array, most: float, order: Indices, ways: Arra
 
 @compiled(error_model="numpy")
 def along(
-    bodies: tuple[Chain, Arm, Room], exact: bool, asked: Array, goals: Goals, nearest: Array,
-    most: tuple[float, float, int], samples: Array, towards: Array, ends: Array, efforts: Array,
+    bodies: tuple[Chain, Arm, Room, bool], asked: Array, goals: Goals, nearest: Array, most: tuple[float, float, int],
+    samples: Array, towards: Array, found: tuple[Array, Array],
 ) -> None:  # fmt: skip
     """Follow branches from samples towards other values of the joint that is held, as far as they exist.
 
     Args:
-        bodies: the joints; the arm that they are, or nearly are; room, written.
-        exact: whether they are that arm. Else a descent with the joint at rest leads to the goals.
+        bodies: the joints; the arm that they are, or nearly are; room, written; whether they are that arm exactly. Else
+            a descent with the joint at rest leads to the goals.
         asked: (5,) as in `chain_kernel.reach`.
         goals: one placement.
         nearest: (2, n) as there.
@@ -75,25 +75,25 @@ def along(
             postures are tried.
         samples: (k, n), which are only near to the goals, or were a little beyond limits and clamped to them.
         towards: (k,) values of the joint that is held.
-        ends: (k, 2, n) written: the posture at each sample, or the first one that is found on the way; the last one.
-        efforts: (k, 2) written: of both; inf where there is none.
+        found: written: the posture at each sample, or the first one that is found on the way, and the last one
+            (k, 2, n); the effort of both (k, 2), inf where there is none.
     """
-    held, (gain, least, count) = bodies[1].joints[bodies[1].held], most
+    held, (gain, least, count), (ends, efforts) = bodies[1].joints[bodies[1].held], most, found
     there = np.empty(samples.shape[1])
     for k in range(len(samples)):
         q, begin, end = samples[k], ends[k, 0], ends[k, 1]
         size, share = towards[k] - q[held], 0.0
-        first = _at(bodies, exact, asked, goals, nearest, q[held], q, begin)
+        first = _at(bodies, asked, goals, nearest, q[held], q, begin)
         while first == np.inf and size != 0.0 and share < 0.95:  # the branch begins between the samples
             share += 0.5 * (1.0 - share)
-            first = _at(bodies, exact, asked, goals, nearest, q[held] + share * size, q, begin)
+            first = _at(bodies, asked, goals, nearest, q[held] + share * size, q, begin)
         copy(begin, end)
         efforts[k, 0] = efforts[k, 1] = first
         if first == np.inf or size == 0.0:
             continue
         near, far, share = share, 1.0, 1.0
         for _ in range(count):
-            effort = _at(bodies, exact, asked, goals, nearest, q[held] + share * size, end, there)
+            effort = _at(bodies, asked, goals, nearest, q[held] + share * size, end, there)
             if effort == np.inf:
                 far = share
             else:
@@ -110,11 +110,11 @@ def along(
 
 @compiled(inner=True, error_model="numpy")
 def _at(
-    bodies: tuple[Chain, Arm, Room], exact: bool, asked: Array, goals: Goals, nearest: Array, value: float, q: Array,
+    bodies: tuple[Chain, Arm, Room, bool], asked: Array, goals: Goals, nearest: Array, value: float, q: Array,
     posture: Array,
 ) -> float:  # fmt: skip
     """The effort of the posture on the branch of q (n,) with the held joint at a value, written; inf for none."""
-    chain, arm, room = bodies
+    chain, arm, room, exact = bodies
     held = arm.joints[arm.held]
     effort = beside(arm, goals.tables[0], (chain.lower, chain.upper), nearest, value, q, posture)
     if exact or effort == np.inf:

@@ -145,8 +145,8 @@ class PlainChain:
         """Where branches of samples (k, n) begin and end on the way to values (k,): see `branch_kernel.along`."""
         assert self.guide is not None
         ends, efforts = np.empty((len(samples), 2, samples.shape[1])), np.empty((len(samples), 2))
-        bodies, exact = (self.chain, self.guide, self.room(rows_of(goals))), self.arm is not None
-        branch_kernel.along(bodies, exact, asked, goals, nearest, most, samples, towards, ends, efforts)
+        bodies = self.chain, self.guide, self.room(rows_of(goals)), self.arm is not None
+        branch_kernel.along(bodies, asked, goals, nearest, most, samples, towards, (ends, efforts))
         return ends, efforts
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
@@ -280,6 +280,6 @@ def compiled_kernel(_: Any) -> None:
     goals, efforts = Goals(np.zeros((1, 36)), entries), np.empty((0, 2))
     branch_kernel.downhill(np.zeros((2, BRANCHES)), np.zeros((2, BRANCHES)), 0.0, joint, efforts)
     branch_kernel.along(
-        (chain, one_arm, room), True, np.zeros(5), goals, np.zeros((2, 1)), (0.0, 0.0, 0), axis[:0, :1].copy(),
-        _ONE[:0], np.empty((0, 2, 1)), efforts,
+        (chain, one_arm, room, True), np.zeros(5), goals, np.zeros((2, 1)), (0.0, 0.0, 0), axis[:0, :1].copy(),
+        _ONE[:0], (np.empty((0, 2, 1)), efforts),
     )  # fmt: skip
