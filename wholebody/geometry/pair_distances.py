@@ -108,6 +108,12 @@ class PairDistances:
             compute(geometry, data, number)
         return self.read(numbers)
 
+    def one(self, number: int) -> float:
+        """The distance of the pair with this number."""
+        if not self.kept:
+            return float(self.measured(np.array([number]))[0, 0])
+        return float(pin.computeDistance(self.geometry, self.data, number).min_distance)
+
     def all_measured(self) -> Array:
         """The same of all pairs, in an array that the next question may overwrite."""
         if not self.kept:

@@ -292,6 +292,12 @@ class Proximity:
         self.seconds += time.perf_counter() - began
         return numbers, placed
 
+    def distance(self, data: Any, number: int) -> float:
+        """The signed distance of one pair at Pinocchio's `data`, metres."""
+        self.place(data)
+        self.asked += 1
+        return self.distances.one(number)
+
     def results_of(self, index: Indices) -> Array:
         """(pairs, 20) what coal computed last, see `memory_views.fields`; only the rows of `index` (k,) count."""
         results = self.distances.results if self._read is None else self._read

@@ -67,6 +67,7 @@ class Workspace(NotCopyable):
         self.owners = built.owners
         self.state = State(built.model)
         self.moved: dict[str, tuple[pin.SE3, pin.SE3]] = {}
+        self._short = -1  # a pair that did not keep its clearance, see `least_gap`
         self._inside: tuple[str, ...] = ()
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
@@ -80,7 +81,7 @@ class Workspace(NotCopyable):
         self.proximity.reset()
         self.refresh()
         self.moved.clear()
-        self._inside = ()
+        self._inside, self._short = (), -1
 
     def refresh(self) -> None:
         """See things where they are now; `moved` has those that moved there."""
@@ -166,6 +167,25 @@ class Workspace(NotCopyable):
     def near_views(self, q: Array, within: float) -> Contacts:
         """What `near` returns, in arrays that the next call of this overwrites."""
         return self.proximity.query_views(self.state.update(q).data, within)
+
+    def least_gap(self, q: Array, clearances: Array, within: float) -> float:
+        """The least of distances less clearances (pairs,) at q (nq,), of pairs nearer than `within`, inf without any.
+
+        Where it is negative, it may be that of another pair that is too near: the one of the last time is asked first.
+        """
+        data = self.state.update(q).data
+        if self._short >= 0:
+            short = self.proximity.distance(data, self._short) - float(clearances[self._short])
+            if short < 0.0:
+                return short
+        near = self.proximity.query_views(data, within)
+        if not len(near.number):
+            return np.inf
+        gaps = near.distance - clearances[near.number]
+        least = int(gaps.argmin())
+        if gaps[least] < 0.0:
+            self._short = int(near.number[least])
+        return float(gaps[least])
 
     def largest_approach(self, most: Array) -> Array:
         """Most (pairs,) that distances can fall while freedoms move by at most `most` (nv,); inf of carried things."""

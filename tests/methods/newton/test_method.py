@@ -159,6 +159,15 @@ def test_what_it_has_no_equations_for_is_refused_by_name(human: wb.Figure) -> No
     assert "PotentialEnergy is reported, not minimised" in wb.methods.Newton().solve(problem).message
 
 
+def test_what_is_left_out_is_known_without_equations(human: wb.Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Height depends on the root, which is free of what is minimised, unless another measure counts it."""
+    monkeypatch.setattr("wholebody.methods.newton.terms.FigureSystem.__init__", None)
+    monkeypatch.setattr("wholebody.methods.newton.figure_bodies.FigureBodies.__init__", None)
+    method, height, goal = wb.methods.Newton(), wb.tasks.PotentialEnergy(), wb.Point("right_palm", (0.3, -0.3, 1.0))
+    for measures, left_out in (([height], ("PotentialEnergy",)), ([wb.Effort(), height], ()), ([wb.Effort()], ())):
+        assert method.leaves_out(_standing(wb.Scene(human), goal, measures=measures)) == left_out
+
+
 def test_nothing_is_jumped_over(avatar: wb.Figure, least_distance: Callable[..., float]) -> None:
     # a plate a millimetre thick between the hand and its goal; steps of the hand are up to eight centimetres
     scene = wb.Scene(avatar).add(wb.Box((0.001, 0.6, 0.6)), name="plate", at=(0.4, -0.25, 1.1))

@@ -18,7 +18,7 @@ from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
-from wholebody.methods.newton.measures import MINIMISED
+from wholebody.methods.newton.measures import MINIMISED, split_measures
 from wholebody.methods.newton.multistart import NewtonMultistart, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
@@ -74,7 +74,7 @@ class Newton(Settings, Descends):
         if not problem.measures_given or all(isinstance(term, MINIMISED) for term in problem.measures):
             return ()
         with problem.borrow() as workspace:
-            return tuple(FigureSystem(problem, workspace, self.algebra).objective.reported)
+            return tuple(type(term).__name__ for term in split_measures(problem, workspace.state)[1])
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

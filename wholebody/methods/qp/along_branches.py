@@ -23,7 +23,7 @@ class Look(NamedTuple):
 
     values: Array  # (n,) of the joints
     effort: float
-    gap: float  # m: least distance of a pair beyond its clearance
+    gap: float  # m: least distance of a pair beyond its clearance, where negative of one pair
 
 
 class Along(NamedTuple):
@@ -34,67 +34,73 @@ class Along(NamedTuple):
     at: Array  # (nq,) start
     nearest: Array  # (2, n) see `chain_kernel.reach`
     clearances: Array  # (pairs,) metres
+    within: float  # m: the largest of them
     workspace: Workspace
     asked: Array  # (5,) see `chain_kernel.reach`
 
     def least(self, branches: Branches, most: float) -> Look | None:
         """The free posture of least effort, if that is less than `most`; the first one where no effort counts."""
-        best, held, measured = None, self.chain.held, bool(self.nearest[1].any())
-        for values, towards, effort in branches.downhill(held):
-            if effort >= most:
-                break
-            here, share = self._look(values, values[held]), 1.0
-            while here is None and share > 0.05:  # the branch begins between the samples
-                share *= 0.5
-                here = self._look(values, towards + share * (values[held] - towards))
-            if here is None or here.gap < 0.0:
-                continue
-            if measured:
-                bottom = towards == values[held]
-                here = self._to_the_edge(here, self._least_along(here) if bottom else towards, most)
-            if here.effort < most:
-                best, most = here, here.effort
+        best, measured, held, blocked = None, bool(self.nearest[1].any()), self.chain.held, -1
+        order, ways = self.chain.downhill(branches, most)
+        together = 8  # of which branches are followed at once; more: less time in Python, more for what is not needed
+        for begin in range(0, len(order), together):
+            some = order[begin : begin + together]
+            samples, towards = branches.values[some], ways[begin : begin + together, 0].copy()
+            ends, efforts = self._along(samples, towards, most)
+            for k, (first, last) in enumerate(efforts.tolist()):
+                if ways[begin + k, 1] >= most:
+                    return best
+                bottom = towards[k] == samples[k, held]
+                least = ways[begin + k, 1] if bottom and first < np.inf else min(first, last)
+                if least >= most or some[k] == blocked:  # a sample that is alone in its branch comes twice
+                    continue
+                here = self._look(ends[k, 0], first)
+                if here.gap < 0.0:
+                    blocked = some[k] if here.values[held] == samples[k, held] else -1
+                    continue
+                if measured:
+                    end, last = self._least_along(here.values) if bottom else (ends[k, 1], last)
+                    here = self._to_the_edge(here, end, last, most)
+                if here.effort < most:
+                    best, most = here, here.effort
         return best
 
-    def _least_along(self, here: Look) -> float:
-        """The value of the held joint where the branch has its least effort, blocked or not."""
-        end = here.values[None, None].copy()
-        self.chain.descents(self.goals.tables[None], self.goals, self.nearest[None], self.asked, end, 1)
-        return float(end[0, 0, self.chain.held])
+    def _along(self, samples: Array, towards: Array, most: float) -> tuple[Array, Array]:
+        asked = SEEDS.gain, most, SEEDS.closer
+        return self.chain.along(self.goals, self.nearest, self.asked, samples, towards, asked)
 
-    def _to_the_edge(self, free: Look, end: float, most: float) -> Look:
-        """From a free posture on towards a value of the held joint, as far as all is free and less than `most` is left.
+    def _least_along(self, here: Array) -> tuple[Array, float]:
+        """The posture (n,) where a branch has its least effort, blocked or not, and that effort."""
+        end = here[None, None].copy()
+        found, _ = self.chain.descents(self.goals.tables[None], self.goals, self.nearest[None], self.asked, end, 1)
+        return end[0, 0], float(found[0, 0, 1])
+
+    def _to_the_edge(self, free: Look, end: Array, last: float, most: float) -> Look:
+        """From a free posture on towards an end (n,) of its branch, as far as all is free and less than `most` is left.
 
         Regula falsi on the least gap (M. Dowell, P. Jarratt, "A modified regula falsi", BIT 11, 1971).
         """
-        begin, near, far = free.values[self.chain.held], (0.0, free.gap), (1.0, np.nan)
-        for count in range(SEEDS.closer):
-            bent = near[1] / (near[1] - far[1]) if far[1] < 0.0 else 0.5
-            share = near[0] + (far[0] - near[0]) * min(max(bent, 0.05), 0.95) if count else 1.0
-            here, before = self._look(free.values, begin + share * (end - begin)), free.effort
+        held, near, far, share = self.chain.held, (0.0, free.gap), (1.0, np.nan), 1.0
+        begin, size = free.values[held], end[held] - free.values[held]
+        for _ in range(SEEDS.closer):
+            if last >= min(most, (1.0 - SEEDS.gain) * free.effort):
+                break
+            here = self._look(end, last) if last < np.inf else None
             if here is not None and here.gap >= 0.0:
-                free = here if here.effort < before else free
-                near, far, gained = (share, here.gap), (far[0], 0.5 * far[1]), before - free.effort
-                # halves of the way to where a branch ends gain 0.7 of those before, or less
-                last = far[1] != far[1] and gained < max(SEEDS.gain * before, 0.25 * (free.effort - most))
-                if share == 1.0 or here.gap <= SEEDS.edge or last:
+                free, near, far = here, (share, here.gap), (far[0], 0.5 * far[1])
+                if share == 1.0 or here.gap <= SEEDS.edge:
                     break
             else:
                 near, far = (near[0], 0.5 * near[1]), (share, np.nan if here is None else here.gap)
-                if here is not None and here.effort >= min(most, (1.0 - SEEDS.gain) * before):
-                    break
+            bent = near[1] / (near[1] - far[1]) if far[1] < 0.0 else 0.5
+            share = near[0] + (far[0] - near[0]) * min(max(bent, 0.05), 0.95)
+            end = free.values.copy()
+            end[held] = begin + share * size
+            ends, efforts = self._along(end[None], end[[held]], most)
+            end, last = ends[0, 0], float(efforts[0, 0])
         return free
 
-    def _look(self, values: Array, held: float) -> Look | None:
-        """The posture of a branch near values (n,) with one of the held joint; None where there is none."""
-        values = values.copy()
-        values[self.chain.held] = held
-        # samples are only near to the goals, or were a little beyond limits and clamped to them
-        found = self.chain.beside(self.goals, self.nearest, values, self.asked)
-        if found is None:
-            return None
-        within = float(np.maximum.reduce(self.clearances, initial=0.0)) + SEEDS.ahead
-        near = self.workspace.near_views(self.chain.posture(found, self.at), within)
-        gaps, away = near.distance - self.clearances[near.number], found - self.nearest[0]
-        effort = float(self.nearest[1].dot(away * away))
-        return Look(found, effort, float(np.minimum.reduce(gaps, initial=SEEDS.ahead)))
+    def _look(self, values: Array, effort: float) -> Look:
+        """A posture (n,), and how much room it has."""
+        gap = self.workspace.least_gap(self.chain.posture(values, self.at), self.clearances, self.within + SEEDS.ahead)
+        return Look(values, effort, min(gap, SEEDS.ahead))

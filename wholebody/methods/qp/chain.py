@@ -202,7 +202,8 @@ class Descents:
         """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
         goals, at, nearest, clearances = self.asked
         asked = how_far(self.settings, 1, others=True)
-        found = Along(self.chain, goals, at, nearest, clearances, self.workspace, asked).least(branches, most)
+        along = Along(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
+        found = along.least(branches, most)
         return None if found is None else self.chain.posture(found.values, at)
 
     def _branches(self) -> Branches:
@@ -325,8 +326,7 @@ class Rule(NamedTuple):
 
 def is_free(workspace: Workspace, q: Array, clearances: Array, within: float) -> bool:
     """Whether every pair keeps its clearance (pairs,), at most `within` metres, at a posture (nq,)."""
-    near = workspace.near_views(q, within)
-    return not len(near.number) or not (near.distance < clearances[near.number]).any()
+    return workspace.least_gap(q, clearances, within) >= 0.0
 
 
 def distance_of(problem: Problem, chain: PlainChain) -> SquaredDistance | None:

@@ -7,7 +7,6 @@ Universal Robots); or the same from the end to the base. Of seven joints one is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
 from typing import Any, NamedTuple
@@ -32,30 +31,6 @@ class Branches(NamedTuple):
     values: Array  # (k, n) of the joints
     effort: Array  # (k,) of each; inf where it does not exist or is beyond limits
     least: Array  # (m, n) those that take less effort than the samples beside them, the least first
-
-    def downhill(self, held: int) -> Iterator[tuple[Array, float, float]]:
-        """Each posture (n,) within limits, the value of the held joint to which its branch falls, the effort there.
-
-        That is the sample beside it of less effort; else its own, and a parabola's least; else one beyond limits.
-        """
-        own, at = self.effort.reshape(-1, BRANCHES), self.values[:, held].reshape(-1, BRANCHES)
-        ahead = np.full((len(own) + 2, BRANCHES), np.inf)
-        ahead[1:-1] = own
-        before, after = ahead[:-2], ahead[2:]
-        lower = np.minimum(before, after)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            step, bent = np.nanmedian(np.diff(at, axis=0)), before - 2.0 * own + after
-            least = own - 0.125 * (after - before) ** 2 / bent
-            beyond = own - 3.0 * (np.where(np.isinf(before), after, before) - own)  # it falls faster towards limits
-        falls, bends = lower < own, (bent > 0.0) & (bent < np.inf)
-        back = np.where(falls, before < after, np.isinf(before))
-        towards = np.where(bends & ~falls, at, at + np.where(back, -step, step)).ravel()
-        effort = np.where(falls, lower, np.where(bends, least, beyond)).ravel()
-        effort[np.isinf(self.effort)] = np.inf
-        for k in effort.argsort()[: np.count_nonzero(effort < np.inf)].tolist():
-            yield self.values[k], towards[k], effort[k]
-            if effort[k] == -np.inf:  # alone: the branch falls to either side
-                yield self.values[k], 2.0 * self.values[k, held] - towards[k], effort[k]
 
 
 def closed_form(chain: Chain, alike: float = ALIKE) -> Arm | None:
@@ -134,4 +109,3 @@ def compiled_kernel(closed_form_kernel: Any) -> None:
     closed_form_kernel.branches(arm, goal, np.zeros(0), found)
     order = np.zeros(0, dtype=np.intp)
     closed_form_kernel.sampled(arm, goal, limits, near, found, np.zeros((0, BRANCHES)), order)
-    closed_form_kernel.beside(arm, goal, limits, near, one, one.copy())

@@ -347,17 +347,18 @@ def within(q: Array, lower: Array, upper: Array, nearest: Array, slack: float) -
     return effort
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def beside(
-    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, q: Array, posture: Array
+    arm: Arm, goal: Array, limits: tuple[Array, Array], nearest: Array, value: float, q: Array, posture: Array
 ) -> float:  # fmt: skip
-    """Effort of the branch nearest to q (n,), written, with its held joint; inf if over 1 rad away."""
+    """Effort of the branch nearest to q (n,), written, with its held joint at a value; inf if over 1 rad away."""
     found, best, chosen = np.empty((1, BRANCHES, len(q))), np.inf, -1
-    branches(arm, goal, q[arm.joints[arm.held]] * np.ones(1), found)
+    held = arm.joints[arm.held]
+    branches(arm, goal, value * np.ones(1), found)
     for b in range(BRANCHES):
-        effort, away = within(found[0, b], limits[0], limits[1], nearest, SLACK), 0.0
+        effort, away = within(found[0, b], limits[0], limits[1], nearest, SLACK), abs(found[0, b, held] - value)
         for i in range(len(q)):
-            away = max(away, abs(found[0, b, i] - q[i]))
+            away = max(away, 0.0 if i == held else abs(found[0, b, i] - q[i]))
         if effort < np.inf and away < min(best, 1.0):
             best, chosen, most = away, b, effort
     if chosen < 0:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
-from wholebody.methods.qp import chain_kernel
+from wholebody.methods.qp import branch_kernel, chain_kernel
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
@@ -130,26 +130,24 @@ class PlainChain:
         values = found.reshape(-1, len(self.idx_v))
         return Branches(values, effort.ravel(), values[order[:count]])
 
-    def beside(self, goals: Goals, nearest: Array, values: Array, asked: Array) -> Array | None:
-        """The branch (n,) nearest to values (n,), with that of the joint that is held; None where there is none."""
-        found, limits = np.empty_like(values), (self.chain.lower, self.chain.upper)
-        effort = closed_form_kernel().beside(self.guide, goals.tables[0], limits, nearest, values, found)
-        return self._met(goals, found, asked) if effort < np.inf else None
+    def downhill(self, branches: Branches, most: float) -> tuple[Indices, Array]:
+        """Samples (k,) from which branches fall below an effort, and ways (k, 2): see `branch_kernel.downhill`."""
+        effort, count = branches.effort.reshape(-1, BRANCHES), 2 * branches.effort.size
+        order, ways = np.empty(count, dtype=np.intp), np.empty((count, 2))
+        held = branches.values[:, self.held].copy().reshape(-1, BRANCHES)
+        count = branch_kernel.downhill(effort, held, most, order, ways)
+        return order[:count], ways[:count]
 
-    def _met(self, goals: Goals, values: Array, asked: Array) -> Array | None:
-        """Values (n,) of the guide, which a descent with the held joint at rest leads to the goals where it is near."""
-        if self.arm is not None:
-            return values
-        lower, upper = self.chain.lower.copy(), self.chain.upper.copy()
-        lower[self.held] = upper[self.held] = values[self.held]
-        chain, size = with_values(self.chain, lower=lower, upper=upper), len(values)
-        room, found = self.room(rows_of(goals)), np.empty((1, 1, 4))
-        at_rest = np.array([[values, np.zeros(size)]])
-        compiled_kernel().reach_all(
-            (chain, _NO_ARM, room), asked, (goals.tables[None], goals.entries), self.samples, at_rest,
-            values[None, None], found, np.ones(1, dtype=np.intp),
-        )  # fmt: skip
-        return values if found[0, 0, 1] < np.inf else None
+    def along(
+        self, goals: Goals, nearest: Array, asked: Array, samples: Array, towards: Array,
+        most: tuple[float, float, int],
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Where branches of samples (k, n) begin and end on the way to values (k,): see `branch_kernel.along`."""
+        assert self.guide is not None
+        ends, efforts = np.empty((len(samples), 2, samples.shape[1])), np.empty((len(samples), 2))
+        bodies = self.chain, self.guide, self.room(rows_of(goals)), self.arm is not None
+        branch_kernel.along(bodies, asked, goals, nearest, most, samples, towards, (ends, efforts))
+        return ends, efforts
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof."""
@@ -273,7 +271,15 @@ def compiled_kernel(_: Any) -> None:
         np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
     )
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
+    bodies, entries, near = (chain, _NO_ARM, room), np.zeros((0, 6), dtype=np.int64), np.zeros((0, 2, 1))
     chain_kernel.reach_all(
-        (chain, _NO_ARM, room), np.zeros(5), (np.zeros((0, 0, 36)), np.zeros((0, 6), dtype=np.int64)),
-        (1, 1), np.zeros((0, 2, 1)), np.zeros((0, 1, 1)), np.zeros((0, 1, 4)), np.zeros(0, dtype=np.intp),
+        bodies, np.zeros(5), (np.zeros((0, 0, 36)), entries), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
+        np.zeros(0, dtype=np.intp),
+    )  # fmt: skip
+    one_arm = with_values(_NO_ARM, axes=axis, points=axis, joints=joint, held=0)
+    goals, efforts = Goals(np.zeros((1, 36)), entries), np.empty((0, 2))
+    branch_kernel.downhill(np.zeros((2, BRANCHES)), np.zeros((2, BRANCHES)), 0.0, joint, efforts)
+    branch_kernel.along(
+        (chain, one_arm, room, True), np.zeros(5), goals, np.zeros((2, 1)), (0.0, 0.0, 0), axis[:0, :1].copy(),
+        _ONE[:0], (np.empty((0, 2, 1)), efforts),
     )  # fmt: skip
