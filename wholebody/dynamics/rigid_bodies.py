@@ -354,13 +354,10 @@ class RigidBodies:
 
     def _events(self, program: StepProgram, time: float, number: Indices, speed: Array, impulse: Array) -> list[Event]:
         """Impulses (k, 3) on B at points (k,), with speeds (k,) of approach, as events."""
-        points, bodies = program.points, program.points.bodies[number].tolist()
-        bounce = self._pieces.restitution[points.pair[number]].tolist()
+        points, bounce = program.points, self._pieces.restitution[program.points.pair[number]].tolist()
         values = zip(points.point[number], points.normal[number], speed.tolist(), impulse, bounce, strict=True)
-        return [
-            Event(time, self.names[first], self.names[second], *each)
-            for (first, second), each in zip(bodies, values, strict=True)
-        ]
+        both = zip(points.bodies[number].tolist(), values, strict=True)
+        return [Event(time, self.names[first], self.names[second], *each) for (first, second), each in both]
 
     def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""

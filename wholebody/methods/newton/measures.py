@@ -172,7 +172,7 @@ def split_measures(problem: Problem, state: State) -> tuple[list[Measure], list[
     model, roots = problem.scene.model, problem.scene.figure.roots.values()
     free = [int(model.joints[joint].idx_v) for joint in roots]
     counted = [range(first, first + 6) for first in free if _counts_root(problem, state, first)]
-    plain = [kind for kind in model.joints if kind.nq == kind.nv == 1]
+    plain = [kind for kind in list(model.joints)[1:] if kind.nq == kind.nv == 1]  # the first is the world
     turning = [kind.idx_v for kind in plain if kind.shortname().startswith("JointModelR")]
     tangent = np.array([*turning, *chain.from_iterable(counted)], dtype=np.intp)
     found: tuple[list[Measure], list[Measure]] = [], []
