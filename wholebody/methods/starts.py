@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -143,12 +143,13 @@ def crouched(problem: Problem, state: State, start: Array) -> Array | None:
 def seated(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn."""
     figure = problem.scene.figure
-    for term in (*problem.goals, *problem.constraints):
-        over = [part for part in term.parts if isinstance(part, Over)] if isinstance(term, Sit) else []
-        body = body_of(problem.scene, [term.frame]) if over else None
+    terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if isinstance(term, Sit)]
+    for term in terms:
+        body = body_of(problem.scene, [term.pelvis])
         if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:
             continue
-        place, face, high = over[0].place, over[0].face, over[0].high[2]
+        over = next(part for part in term.parts if isinstance(part, Over))
+        place, face, high = over.place, over.face, over.high[2]
         middle, axes = face.at(state.update(start))
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
         at = middle + high * axes[2]

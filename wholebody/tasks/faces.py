@@ -148,8 +148,8 @@ def _flats(
     counts: Callable[[Array], Mask] = lambda points: np.ones(len(points), bool),
 ) -> list[_Flat]:
     """The largest flat faces with normals (k, 3) that `admits` takes, as far as `counts` takes their points (k, 3)."""
-    flat = [k for k, shape in enumerate(thing.shapes) if isinstance(shape, (coal.Box, coal.Convex))]
-    solids = {number: _planes(thing, number, state) for number in flat}
+    numbers = [k for k, shape in enumerate(thing.shapes) if isinstance(shape, (coal.Box, coal.Convex))]
+    solids = {number: _planes(thing, number, state) for number in numbers}
     facets = [one for piece, planes in solids.items() for one in _facets(thing, piece, planes, admits, state)]
     groups: list[list[_Facet]] = []
     facets.sort(key=lambda one: -one.area)
