@@ -108,3 +108,16 @@ def test_a_stool_has_no_back() -> None:
     scene = beside(made(CHAIR[0], *LEGS), placed(0.0))
     with pytest.raises(wb.InputError, match=r"has no flat back above its seat; name the thing or piece that is it"):
         wb.Problem(scene, goals=[wb.Sit(on="thing", back="thing")])
+
+
+def test_nobody_sits_under_a_seat() -> None:
+    """A woman whose shanks are short for a seat hung under it with her thighs, and that was called solved."""
+    scene = beside(made(*CHAIR), placed(0.0))
+    problem = wb.Problem(scene, goals=[wb.Sit(on="thing")])
+    q = scene.figure.posture("sitting")
+    q[:3] = (0.72, -0.4, 0.43 - 0.2)  # m
+    under = 0.43 - scene.figure.placement(q, "pelvis").translation[2]
+    assert under > 0.1
+    with scene.figure.posed(q) as state:
+        missed = problem.goals[0].error(state)
+    assert np.abs(np.abs(missed) - under).min() < 1e-6

@@ -140,8 +140,11 @@ def crouched(problem: Problem, state: State, start: Array) -> Array | None:
     return _moved(problem, state, start, move) if move.any() else None
 
 
-def seated(problem: Problem, state: State, start: Array) -> Iterator[Array]:
-    """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn."""
+def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> Iterator[Array]:
+    """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn.
+
+    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be.
+    """
     figure = problem.scene.figure
     terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if isinstance(term, Sit)]
     for term in terms:
@@ -155,7 +158,9 @@ def seated(problem: Problem, state: State, start: Array) -> Iterator[Array]:
         at = middle + high * axes[2]
         for yaw in np.arange(8) * 0.25 * np.pi:
             turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3))
-            root = pin.SE3(np.eye(3), at) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
+            way = axes[:2] @ turn.rotation[:, 0]
+            edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
+            root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
             yield _moved(problem, state, start, _to_posture(problem, start, body, "sitting", root))
 
 

@@ -80,7 +80,7 @@ class Sit(ContactTerm):
         edge = np.maximum(seat.half - np.minimum(0.08, 0.5 * seat.half), 0.0)  # m: half a narrow seat
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place, rest) + 0.01
-        over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
+        over = Over(place, seat, np.append(-edge, 0.0), np.append(edge, deep))  # 0: not below the seat
         root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
         left = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 1]
         parts: list[Part] = [Gap(bottom, seat.surface, seat), over]

@@ -69,8 +69,9 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
-        there = self._nearer(seated(self.problem, self.lineariser.state, self._start))
-        yield Attempt(there, self.directly, "from the seat")
+        for ahead in (0.0, 1.0):
+            there = self._nearer(seated(self.problem, self.lineariser.state, self._start, ahead))
+            yield Attempt(there, self.directly, "from the seat")
         yield Attempt(begin, self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
