@@ -48,7 +48,7 @@ class QPMultistart(Search):
         # `least`: measures where the goals are known to be met, if through things; 0 where nothing is known
         self.out_of_reach, self._through_measure = bool(near), least
         if not near:
-            self.search(self._attempts(begin or (self._start,)))
+            self.search(self._attempts(begin))
         for q in near:
             self.accept(self._ran(self._closest(), q))
         if other is not None:
@@ -69,10 +69,10 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
-        for ahead in (0.0, 1.0):
+        for ahead in () if begin else (0.0, 1.0):
             there = self._nearer(seated(self.problem, self.lineariser.state, self._start, ahead))
             yield Attempt(there, self.directly, "from the seat")
-        yield Attempt(begin, self.directly, "directly")
+        yield Attempt(begin or [self._start], self.directly, "directly")
         rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
         yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
@@ -89,7 +89,9 @@ class QPMultistart(Search):
 
     def _nearer(self, postures: Iterable[Array]) -> Iterator[Array]:
         """Of postures (nq,) the nearest to goals and holds, if it is nearer than the start by a third."""
-        known = [self._start, *self.lineariser.defined(postures)]
+        if not (others := [*self.lineariser.defined(postures)]):
+            return
+        known = [self._start, *others]
         found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
         missed = [each.left + each.hold for each in found]
         if min(missed) < 2 / 3 * missed[0]:  # else few goals are met from there that are not from the start
