@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.starts import Minima, alike, crouched, restarts, throughout
+from wholebody.methods.starts import Minima, alike, crouched, restarts, seated, throughout
 
 
 def descents_needed(values, fewest: int = 0) -> int:
@@ -144,3 +144,31 @@ def test_nobody_squats_who_sits_kneels_or_holds_on() -> None:
         wb.Hold("pelvis"),
     ):
         assert squats(wb.Problem(scene, constraints=[constraint])) is None
+
+
+@pytest.mark.parametrize("ahead", [0.0, 1.0])
+def test_who_sits_is_over_the_seat_in_eight_directions_and_what_is_frozen_stays(ahead: float) -> None:
+    scene = wb.Scene({"anna": wb.load("human", sex="female"), "ben": wb.load("human")})
+    scene.add(wb.Box((0.5, 0.4, 0.05)), name="seat", at=(2.0, 1.0, 0.425))
+    problem = wb.Problem(scene, goals=[wb.Sit("seat", pelvis="anna/pelvis", trunk="anna/thorax")])
+    stays = wb.Problem(scene, problem.start, goals=problem.goals, constraints=[wb.Freeze("anna/root")])
+    with problem.borrow() as workspace:
+        found = list(seated(problem, workspace.state, problem.start, ahead))
+        frozen = list(seated(stays, workspace.state, problem.start, ahead))
+    figure, yaws = scene.figure, set()
+    sitting = figure.placement(figure.posture("anna/sitting"), "anna/pelvis")
+    for q in found:
+        pelvis = figure.placement(q, "anna/pelvis")
+        turn = pelvis.rotation @ sitting.rotation.T
+        yaws.add(round(float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))) % 360)
+        away = pelvis.translation - (2.0, 1.0, 0.45)
+        assert 0.0 < away[2] < 0.12
+        assert away[:2] == pytest.approx(ahead * float(np.linalg.norm(away[:2])) * turn[:2, 0], abs=1e-9)
+        assert (np.abs(away[:2]) < (0.171, 0.121)).all()  # 80 mm from the edges at least
+        at_edge = np.isclose(np.abs(away[:2]), (0.17, 0.12), atol=1e-6).any()
+        assert at_edge == (ahead == 1.0)
+        for part in ("ben/pelvis", "ben/left_foot"):
+            assert figure.placement(q, part).isApprox(figure.placement(problem.start, part), 1e-9)
+    assert yaws == set(range(0, 360, 45))
+    for q in frozen:
+        assert figure.placement(q, "anna/pelvis").isApprox(figure.placement(problem.start, "anna/pelvis"), 1e-9)
