@@ -115,7 +115,8 @@ def retarget(
         if on := carrier(motion, joints, scene, tracks, still_ground):
             seen, others = as_carried(motion, scene, tracks, on)
             there = at_start(scene, {on: tracks[on]})
-            clip = retarget(seen, figure, there, ground, things=others, names=names, progress=progress)
+            rests = checked_ground(seen, figure, ground, names, surface_of(there, others))  # nobody is carried twice
+            clip = retarget(seen, figure, there, rests, things=others, names=names, progress=progress)
             return brought_back(clip, tracks[on], tracks)
     roles = matched(motion, figure, names)
     if roles.by_structure:
