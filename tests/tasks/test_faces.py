@@ -11,6 +11,7 @@ import trimesh
 
 import wholebody as wb
 from wholebody.base.arrays import Array
+from wholebody.geometry.shapes import Compound
 from wholebody.scene.scene import Scene
 from wholebody.tasks.faces import UP, back_above, bearing_face
 
@@ -108,3 +109,11 @@ def test_a_stool_has_no_back() -> None:
     scene = beside(made(CHAIR[0], *LEGS), placed(0.0))
     with pytest.raises(wb.InputError, match=r"has no flat back above its seat; name the thing or piece that is it"):
         wb.Problem(scene, goals=[wb.Sit(on="thing", back="thing")])
+
+
+def test_of_a_thing_with_a_half_space_one_piece_is_named() -> None:
+    at = pin.SE3.Identity()
+    scene = beside(Compound([(wb.Box(SEAT), placed(0.0)), (wb.HalfSpace(), at)]), at)
+    with pytest.raises(wb.InputError, match=r"half-space among its pieces; name one, as 'thing:0'"):
+        wb.Problem(scene, goals=[wb.Sit(on="thing")])
+    assert wb.Problem(scene, goals=[wb.Sit(on="thing:0")]).goals

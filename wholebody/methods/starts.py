@@ -144,8 +144,9 @@ def seated(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn."""
     figure = problem.scene.figure
     for term in (*problem.goals, *problem.constraints):
-        over = [part for part in term.parts if isinstance(part, Over)] if isinstance(term, Sit) else []
-        body = body_of(problem.scene, [term.frame]) if over else None
+        if not isinstance(term, Sit) or not (over := [part for part in term.parts if isinstance(part, Over)]):
+            continue
+        body = body_of(problem.scene, [term.pelvis])
         if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:
             continue
         place, face, high = over[0].place, over[0].face, over[0].high[2]
