@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -303,3 +305,16 @@ def test_a_ragdoll_that_squeezes_boxes_gives_them_no_energy_from_nowhere() -> No
         energies.append(world.energy)
     assert np.diff(energies).max() < 1e-6  # J; 10 kJ where all blows on a box between thigh and floor were taken back
     assert energies[-1] < 0.6 * energies[0]
+
+
+@pytest.mark.parametrize("yields", [False, True])
+def test_a_figure_without_pieces_touches_nothing(tmp_path: Path, yields: bool) -> None:
+    body = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    (tmp_path / "link.urdf").write_text(f'<robot name="one"><link name="link">{body}</link></robot>')
+    figure = wb.load(tmp_path / "link.urdf", root="free")
+    scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=(0.0, 0.0, 0.3), body=wb.Body(mass=0.5))
+    world = wb.World(scene, spring=wb.Actuated(figure, stiffness=0.0, damping=0.0) if yields else None)
+    for _ in range(30):
+        world.step()
+    fallen = 0.3 - 0.5 * 9.81 * world.time**2
+    assert scene.objects["ball"].placement.translation == pytest.approx((0.0, 0.0, fallen), abs=1e-9)

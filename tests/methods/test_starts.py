@@ -172,3 +172,13 @@ def test_who_sits_is_over_the_seat_in_eight_directions_and_what_is_frozen_stays(
     assert yaws == set(range(0, 360, 45))
     for q in frozen:
         assert figure.placement(q, "anna/pelvis").isApprox(figure.placement(problem.start, "anna/pelvis"), 1e-9)
+
+
+def test_who_sits_on_a_floor_begins_where_the_start_is() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(scene, goals=[wb.Sit("floor")])
+    with problem.borrow() as workspace:
+        assert not list(seated(problem, workspace.state, problem.start))
+    found = wb.solve(problem)
+    assert found.status == "solved"
+    assert np.linalg.norm(found.q[:2] - problem.start[:2]) < 1.0

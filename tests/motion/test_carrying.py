@@ -66,3 +66,20 @@ def test_who_is_left_by_a_lift_does_not_go_with_it(human: wb.Figure) -> None:
         ground = wb.motion.ground(motion, scene=scene)
         assert surface_of(scene, {"lift"})(np.array([0.0, 0.0, 1.0])) == pytest.approx(0.0, abs=1e-5)
         assert carrier(motion, joints, scene, {"lift": track}, ground) == ("" if off else "lift")
+
+
+def test_each_foot_keeps_its_place_on_a_ski_of_its_own(human: wb.Figure) -> None:
+    """The right ski glides ahead of the left one, so nobody stands on one thing alone."""
+    motion, seconds = person(COUNT), np.arange(COUNT) / 30
+    ahead = {"left": 0.5 * seconds, "right": 0.6 * seconds}
+    places = motion.positions.copy()
+    for k, name in enumerate(motion.names):
+        places[:, k, 0] += ahead["right" if name in ("right_ankle", "right_foot") else "left"]
+    scene, tracks = wb.Scene(human), dict[str, np.ndarray]()
+    for side, y in (("left", 0.25), ("right", -0.25)):
+        scene.add(wb.Box((1.0, 0.5, 0.1)), name=side, at=(0.0, y, -0.05))
+        tracks[side] = np.array([(x, y, -0.05, 0.0, 0.0, 0.0, 1.0) for x in ahead[side]])
+    clip = wb.retarget(replace(motion, positions=places, dt=1 / 30), human, scene, things=tracks)
+    for side, way in ahead.items():
+        heel = [human.placement(q, f"{side}_heel").translation[0] for q in clip.q]
+        assert np.ptp(heel - way) < 0.01

@@ -63,7 +63,7 @@ def test_what_does_not_belong_to_a_stream_is_refused(human: wb.Figure) -> None:
         stream.push(replace(motion, dt=0.5))
     with pytest.raises(InputError, match="other joints"):
         stream.push(replace(motion, names=tuple(f"{name} of another" for name in motion.names)))
-    with pytest.raises(InputError, match="the scene has the figure"):
+    with pytest.raises(InputError, match="Retargeter: the scene has the figure"):
         wb.motion.Retargeter(motion, human, wb.Scene(wb.load("hand")))
     assert len(stream.finish()) == 0
     with pytest.raises(InputError, match="was finished"):

@@ -386,5 +386,5 @@ def test_people_of_other_sizes_sit_on_the_seat_of_the_recording(stature: float) 
 
 def test_a_scene_of_several_figures_is_refused_with_what_to_do(human: wb.Figure) -> None:
     scene = wb.Scene({"ann": human, "ben": (human, (1.0, 0.0, 0.0))})
-    with pytest.raises(wb.InputError, match=r"the scene has several figures; leave it out.*posture\(\{'ann': q"):
+    with pytest.raises(wb.InputError, match=r"retarget: the scene has several figures.*posture\(\{'ann': q"):
         wb.retarget(lifting(4)[0], human, scene)

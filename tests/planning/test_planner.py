@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import signal
+import threading
+import time
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -602,6 +605,33 @@ def test_nothing_is_begun_that_the_time_limit_does_not_let_end(monkeypatch: pyte
         found = wb.plan(problem.scene, problem.start, list(problem.goals), constraints=problem.stated, time_limit=limit)
         assert not found.solved
         assert shown[0] - began <= max(limit, 0.1) + 0.1
+
+
+def test_who_is_held_and_stays_has_a_motion_of_no_length(human: wb.Figure) -> None:
+    found = wb.plan(wb.Scene(human), "standing", "standing", constraints=[wb.Hold("left_foot")])
+    assert found.solved
+    assert found.length < 1e-6
+
+
+def test_time_of_a_plan_is_that_of_its_own_thread(planar_arm: Callable[..., wb.Figure]) -> None:
+    """What another thread computes meanwhile is neither limited nor counted."""
+    figure, ended = planar_arm((0.5, 0.4)), threading.Event()
+
+    def busy() -> None:
+        while not ended.is_set():
+            hashlib.sha256(bytes(1_000_000)).digest()  # beside the interpreter's lock
+
+    other = threading.Thread(target=busy)
+    wb.plan(wb.Scene(figure), np.zeros(2), np.array((2.0, 1.0)))  # all is compiled
+    other.start()
+    try:
+        began = time.thread_time()
+        found = wb.plan(wb.Scene(figure), np.zeros(2), np.array((2.0, 1.0)))
+        took = time.thread_time() - began
+    finally:
+        ended.set()
+        other.join()
+    assert 0.0 < found.seconds <= took
 
 
 def test_a_board_turns_to_get_through_a_gap(free_bodies: Callable[..., wb.Figure], least_distance: Distance) -> None:

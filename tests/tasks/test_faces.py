@@ -11,6 +11,7 @@ import trimesh
 
 import wholebody as wb
 from wholebody.base.arrays import Array
+from wholebody.geometry.shapes import Compound
 from wholebody.scene.scene import Scene
 from wholebody.tasks.faces import UP, back_above, bearing_face
 
@@ -121,3 +122,11 @@ def test_nobody_sits_under_a_seat() -> None:
     with scene.figure.posed(q) as state:
         missed = problem.goals[0].error(state)
     assert np.abs(np.abs(missed) - under).min() < 1e-6
+
+
+def test_of_a_thing_with_a_half_space_one_piece_is_named() -> None:
+    at = pin.SE3.Identity()
+    scene = beside(Compound([(wb.Box(SEAT), placed(0.0)), (wb.HalfSpace(), at)]), at)
+    with pytest.raises(wb.InputError, match=r"half-space among its pieces; name one, as 'thing:0'"):
+        wb.Problem(scene, goals=[wb.Sit(on="thing")])
+    assert wb.Problem(scene, goals=[wb.Sit(on="thing:0")]).goals

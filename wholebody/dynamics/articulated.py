@@ -24,7 +24,7 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.blows import BOUNCE, left_for_later
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, turned
+from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, torques, turned
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.pieces import Surfaces, places
@@ -69,9 +69,7 @@ class Articulated:
         free = self._owners < (0 if engine is None else len(engine.bodies))
         # m: most distances of pairs that a step may lead into each other; the engine looks at the others
         self._own_pairs = np.where(free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
-        self._sag = np.zeros(
-            2 * self._model.nv + len(self._own_pairs) + 1
-        )  # m/s2: by limit and pair, the last for others
+        self._sag = np.zeros(2 * self._model.nv + len(self._own_pairs) + 1)  # m/s2: by limit, pair; the last for others
         self._old, self._flesh = Impulses.nothing(0), flesh_of(scene.geometry)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
@@ -190,10 +188,15 @@ class Articulated:
         if engine is None:
             return time, None, False
         held = points.held(bearing)
-        energy = engine.energy()
+        before = engine.energy(), self.energy()
         frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
-        given = frame.wrenches if again else left_for_later(engine, frame, segments, energy)
-        self._react({name: wrench for name, wrench in given.items() if name in segments}, motions, time, segments)
+        given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
+        if not again and left_for_later(engine, frame, given, before, lambda some: self._reacted(some, segments)[1]):
+            paid = sum(before) - engine.energy()
+        else:
+            ways = {name: pin.log6(motions[name][1] * motions[name][0].inverse()).vector for name in given}
+            paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
+        self._react(given, paid, segments)
         return time, frame, False
 
     def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
@@ -291,9 +294,8 @@ class Articulated:
             weights = np.array([self._engine.weight(name) for name in points.bodies])
             falling = time * np.einsum("bij,bj->bi", points.responses[:, :, :3], weights).ravel()
         for again in range(4):
-            room = (
-                points.gap + time**2 * self._sag[np.minimum(points.pair, len(self._sag) - 1)] - SKIN
-            )  # a step removes an overlap
+            sag = self._sag[np.minimum(points.pair, len(self._sag) - 1)]
+            room = points.gap + time**2 * sag - SKIN  # a step removes an overlap
             target = np.where(room >= 0.0, -room / time, np.minimum(-room / time, 0.5))  # m/s, at most
             speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
             found, after = self._solved(inertia, points, speed, target, found)
@@ -380,21 +382,19 @@ class Articulated:
             drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
         self.velocity = drift + velocity
 
-    def _react(self, given: Mapping[str, Array], moved: Moved, time: float, segments: Mapping[str, int]) -> None:
-        """Give the figure the impulses that things gave its segments while they went on, and no energy beside."""
+    def _react(self, given: Mapping[str, Array], paid: float, segments: Mapping[str, int]) -> None:
+        """Give the figure the impulses that things gave its segments while they went on, and at most an energy [J]."""
         if not given:
             return
-        model, data, energy = self._model, self._data, self.energy()
+        self.velocity, first = self._reacted(given, segments)[0], self._model.idx_vs
+        pushed = self._inertia(self.q) @ self.velocity
+        momenta = [self._data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
+        self._settle(paid, 1.0, momenta)
+
+    def _reacted(self, given: Mapping[str, Array], segments: Mapping[str, int]) -> tuple[Array, float]:
+        """The velocity (nv,) and energy [J] of the figure after impulses on its segments."""
         inertia = self._inertia(self.q)
-        pin.computeJointJacobians(model, data, self.q)
-        total = np.zeros(model.nv)
-        for name, wrench in given.items():
-            joint = model.frames[segments[name]].parentJoint
-            if joint:
-                total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrench
-                before, after = moved[name]
-                energy += float(wrench @ pin.log6(after * before.inverse()).vector) / time
-        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, total)
-        pushed, first = inertia @ self.velocity, model.idx_vs
-        momenta = [data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
-        self._settle(energy, 1.0, momenta)
+        joints = {name: self._model.frames[segments[name]].parentJoint for name in given}
+        pushed = torques(self._model, self._data, self.q, [(joints[name], wrench) for name, wrench in given.items()])
+        velocity = self.velocity + impulse_kernel.by_inertia(inertia, pushed)
+        return velocity, 0.5 * float(velocity @ inertia @ velocity) + self._potential()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,32 +13,50 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 BOUNCE = 0.05  # m/s: slower rebounds, of up to 0.13 mm, are left out
 
 
-def left_for_later(engine: RigidBodies, frame: EngineFrame, segments: Collection[str], most: float) -> dict[str, Array]:
-    """The wrenches of a step without its impacts with the figure, which the next step has at its start."""
-    # To the engine it is infinitely heavy, and would bring energy; alternating blows are taken back to `most` [J].
-    wrenches = dict(frame.wrenches)
+def left_for_later(
+    engine: RigidBodies,
+    frame: EngineFrame,
+    given: dict[str, Array],
+    most: tuple[float, float],
+    reacted: Callable[[dict[str, Array]], float],
+) -> bool:
+    """Take back the impacts of a step with the figure, which the next step has at its start; whether only in part.
+
+    To the engine the figure is infinitely heavy, and would bring energy. Alternating blows, of which one depends on the
+    other, are taken back as far as things and figure together have no more energy than before.
+
+    Args:
+        engine: after the step.
+        frame: the step.
+        given: the wrenches (6,) that segments were given; those of what is taken back leave it, in place.
+        most: energy of the things, and of the figure, before the step, J.
+        reacted: the figure's energy after such wrenches, J.
+    """
     met = [(event.first, event.second, event.impulse, event.point) for event in frame.given]
     met += [(second, first, -impulse, point) for first, second, impulse, point in met]
-    blows = [blow for blow in met if blow[0] in segments]
-    if not blows or not impacts(frame.events, segments, BOUNCE):
-        return wrenches
+    blows = [blow for blow in met if blow[0] in given]
+    if not blows or not impacts(frame.events, given, BOUNCE):
+        return False
+    wrenches = [(own, np.hstack([impulse, cross(point, impulse)])) for own, _, impulse, point in blows]
 
-    def taken_back(share: float) -> float:
+    def taken_back(share: float) -> tuple[float, float]:
         for _, other, impulse, point in blows:
             engine.push(other, -share * impulse, point)
-        return engine.energy()
+        for own, wrench in wrenches:
+            given[own] = given[own] + share * wrench
+        return engine.energy(), reacted(given)
 
-    share = share_below((engine.energy(), taken_back(0.5), taken_back(0.5)), most)
-    if share < 1.0:
-        taken_back(share - 1.0)
-    for own, _, impulse, point in blows:
-        wrenches[own] = wrenches[own] + share * np.hstack([impulse, cross(point, impulse)])
-    return wrenches
+    energies = np.array([taken_back(0.0), taken_back(0.5), taken_back(0.5)])
+    share = share_below(energies.sum(axis=1), most[0] + most[1])
+    if share < 1.0 and sum(taken_back(share - 1.0)) > (1.0 + 1e-9) * (most[0] + most[1]):
+        # no share does: then that of the things alone, and the figure is slowed
+        taken_back(share_below(energies[:, 0], most[0]) - share)
+    return share < 1.0
 
 
-def share_below(energies: tuple[float, float, float], most: float) -> float:
-    """Largest share of an impulse with an energy of at most `most` [J]; `energies`: of none, half and all."""
-    none, half, full = energies
+def share_below(energies: Array, most: float) -> float:
+    """Largest share of an impulse with an energy of at most `most` [J]; `energies` (3,): of none, half and all."""
+    none, half, full = energies.tolist()
     square = 2.0 * (none + full - 2.0 * half)  # the energy is none + (full - none - square) s + square s^2
     if full <= most or square <= 0.0:
         return 1.0

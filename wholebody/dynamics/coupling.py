@@ -370,6 +370,16 @@ def turned(workspace: Workspace, before: Array, after: Array) -> float:
     return float(np.arccos(np.clip(cosine.min(initial=1.0), -1.0, 1.0)))
 
 
+def torques(model: pin.Model, data: pin.Data, q: Array, wrenches: Sequence[tuple[int, Array]]) -> Array:
+    """Impulses (nv,) of freedoms at a posture (nq,) from wrenches (6,) about the world's origin on joints."""
+    pin.computeJointJacobians(model, data, q)
+    total = np.zeros(model.nv)
+    for joint, wrench in wrenches:
+        if joint:
+            total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrench
+    return total
+
+
 def drift(
     data: pin.Data, root: int, momentum: Array, gravity: Array, time: float, borne: bool
 ) -> tuple[pin.Force, Array]:

@@ -147,7 +147,9 @@ class World(NotCopyable):
         self._tracked: Array = self._loop.shown
         self._workspace, self.time = scene.workspace(), 0.0
         self._revision = scene.revision
-        self._frames = {name: scene.frame_id(name) for name in segment_placements(scene, self._loop.shown)}
+        names = () if self.engine is None else self.engine.names  # links without pieces touch nothing
+        segments = (name for name in segment_placements(scene, self._loop.shown) if name in names)
+        self._frames = {name: scene.frame_id(name) for name in segments}
         self._before = self._segments(self._loop.shown)
         self._placed = {name: thing.placement for name, thing in scene.objects.items() if thing.segment is None}
         owners = self._workspace.owners

@@ -152,6 +152,8 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> 
         if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:
             continue
         over = next(part for part in term.parts if isinstance(part, Over))
+        if not np.isfinite(over.high).all():  # on a floor one place is as good as another
+            continue
         place, face, high = over.place, over.face, over.high[2]
         middle, axes = face.at(state.update(start))
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)

@@ -31,28 +31,41 @@ def carrier(
 
     `ground` is what still surfaces bear: feet that rest there too make a person who steps on or off.
     """
-    things = Things(scene, tracks)
-    for name, track in tracks.items():
-        if not np.ptp(track, axis=0).max() > RestLimits().height:  # it stays where it is
-            continue
-        bears: Mask = np.zeros(len(motion), dtype=bool)
-        rests: Mask = np.zeros(len(motion), dtype=bool)
+    moving = [name for name, track in tracks.items() if np.ptp(track, axis=0).max() > RestLimits().height]
+    things, borne = Things(scene, tracks), dict[str, Mask]()
+    for name in moving:
+        borne[name] = np.zeros((2, len(motion)), dtype=bool)
         start = things.at(name, 0)
-        surface = surface_of(at_start(scene, {name: track}), [other for other in scene.objects if other != name])
-        for role in (f"{side}_{part}" for side in ("left", "right") for part in ("ankle", "toe")):
-            if role not in joints:
-                continue
+        surface = surface_of(at_start(scene, {name: tracks[name]}), [other for other in scene.objects if other != name])
+        for foot, role in _roles(joints):
             path = motion.positions[:, motion.names.index(joints[role])]
             touched = things.touched(name, path, ON, motion.dt)
             local = things.within(name, path)
             for frame in np.flatnonzero(touched):
                 place = np.array(start.act(local[frame]))
                 below = surface(place)
-                bears[frame] |= below is not None and place[2] - below <= ON
-            rests |= ground.rests.get(role, np.zeros(len(motion), dtype=bool))
-        if bears.any() and not (rests & ~bears).any():
+                borne[name][foot, frame] |= below is not None and place[2] - below <= ON
+    none: Mask = np.zeros(len(motion), dtype=bool)
+    rests = np.any([none, *(ground.rests.get(role, none) for _, role in _roles(joints))], axis=0)
+    for name in moving:
+        apart = [other for other in moving if np.ptp(_seen_from(tracks[name], tracks[other])) > RestLimits().height]
+        if any((borne[other] & ~borne[name]).any() for other in apart):
+            continue
+        if borne[name].any() and not (rests & ~borne[name].any(axis=0)).any():
             return name
     return ""
+
+
+def _roles(joints: Mapping[str, str]) -> list[tuple[int, str]]:
+    """Roles of feet among those that are known: 0 or 1 of the foot, and the role."""
+    roles = [(foot, f"{side}_{part}") for foot, side in enumerate(("left", "right")) for part in ("ankle", "toe")]
+    return [(foot, role) for foot, role in roles if role in joints]
+
+
+def _seen_from(track: Array, other: Array) -> Array:
+    """How far (n,) a thing with another track (n, 7) is from where it was first, in the axes of the first one."""
+    ways = [pin.XYZQUATToSE3(one).actInv(pin.XYZQUATToSE3(two)) for one, two in zip(track, other, strict=True)]
+    return np.array([np.linalg.norm(pin.SE3ToXYZQUAT(ways[0].actInv(way))[:6]) for way in ways])
 
 
 def at_start(scene: Scene, tracks: Mapping[str, Array]) -> Scene:

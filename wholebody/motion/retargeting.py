@@ -107,7 +107,7 @@ def retarget(
     check_one(motion.names, figure, f"the skeleton of {motion.name}")
     function(progress, "progress")
     if scene is not None:
-        same_figure(instance(scene, Scene, "retarget: scene", "make one with wb.Scene(figure)"), figure)
+        same_figure(scene, figure, "retarget")
     tracks = _tracks(motion, scene, things)
     surface = None if scene is None else surface_of(scene, tracks)
     if scene is not None and tracks and ground is not None and not isinstance(ground, Ground) and figure.root == "free":
@@ -115,7 +115,8 @@ def retarget(
         if on := carrier(motion, joints, scene, tracks, still_ground):
             seen, others = as_carried(motion, scene, tracks, on)
             there = at_start(scene, {on: tracks[on]})
-            clip = retarget(seen, figure, there, ground, things=others, names=names, progress=progress)
+            rests = checked_ground(seen, figure, ground, names, surface_of(there, others))  # nobody is carried twice
+            clip = retarget(seen, figure, there, rests, things=others, names=names, progress=progress)
             return brought_back(clip, tracks[on], tracks)
     roles = matched(motion, figure, names)
     if roles.by_structure:
@@ -287,16 +288,17 @@ def _touching(joints: Mapping[str, str], roles: Roles) -> dict[str, str]:
     }
 
 
-def same_figure(scene: Scene, figure: Figure) -> None:
-    """Refuse a scene of another figure, or of several."""
+def same_figure(scene: Scene, figure: Figure, where: str) -> None:
+    """Refuse a scene of another figure, or of several, and what is none."""
+    instance(scene, Scene, f"{where}: scene", "make one with wb.Scene(figure)")
     if scene.figure.root == "several":
         name = next(iter(scene.figure.bodies)).rstrip("/")
         raise InputError(
-            "the scene has several figures; leave it out, move the clip's free root to where the figure "
+            f"{where}: the scene has several figures; leave it out, move the clip's free root to where the figure "
             f"stands, join the postures by figure.posture({{{name!r}: q, ...}}), and free the clip of all by avoid"
         )
     if scene.figure.joints != figure.joints or scene.model.nq != figure.model.nq:
-        raise InputError(f"the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
+        raise InputError(f"{where}: the scene has the figure {scene.figure.name}, not {figure.name}; give its own")
 
 
 def checked_ground(
@@ -353,7 +355,7 @@ def bone_errors(
             f"bone_errors: the clip has {len(clip)} frames and the motion {len(motion)}; give its own clip"
         )
     if scene is not None:
-        same_figure(instance(scene, Scene, "bone_errors: scene", "give that of wb.retarget"), clip.figure)
+        same_figure(scene, clip.figure, "bone_errors")
     roles = matched(motion, clip.figure, names)
     surface = None if scene is None else surface_of(scene, clip.things)
     return errors_of(motion, clip, roles, ground_on(motion, {"skeleton": roles.joints}, surface))

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
@@ -72,7 +71,7 @@ class Retargeter:
         motion = checked_motion(motion, "Retargeter: motion")
         one_figure(figure, "Retargeter: figure")
         if scene is not None:
-            same_figure(instance(scene, Scene, "Retargeter: scene", "make one with wb.Scene(figure)"), figure)
+            same_figure(scene, figure, "Retargeter")
         self._like, self._roles = motion, matched(motion, figure, names)
         surface = None if scene is None else surface_of(scene)
         known = checked_ground(motion, figure, ground, names, surface)

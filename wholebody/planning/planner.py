@@ -5,6 +5,7 @@ ends -> straight motion, else steps along things, else two trees -> shortcuts ->
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,6 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.compiled import compile_all, compile_seconds
 from wholebody.base.errors import InputError
-from wholebody.base.runner import processor_time
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
 from wholebody.methods.simplification import still_dofs
@@ -65,7 +65,7 @@ class Plan:
         violation: largest by which a frame misses limits, constraints and clearances, metres and radians.
         velocity: largest of any joint, in parts of its limit.
         acceleration: the same.
-        seconds: of the processor, without compiling.
+        seconds: of the processor that its thread took, without compiling.
 
     Examples:
         >>> found = wb.plan(scene, standing, human.with_joints(standing, {"left_elbow_flexion": 1.0}))
@@ -110,8 +110,8 @@ def plan(
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
         seed: of the random postures.
-        time_limit: seconds of the processor that all but compiling may take, the judgement too; at least 0.1. Free
-            roots and planar joints are sampled within a metre of the line between the ends.
+        time_limit: seconds of the processor that the caller's thread may take, but for compiling, the judgement too; at
+            least 0.1. Free roots and planar joints are sampled within a metre of the line between the ends.
 
     Raises:
         InputError: the start or the goal overlaps something, or misses a limit or a constraint, or an argument is not
@@ -155,8 +155,8 @@ def plan(
 
 
 def _computed() -> float:
-    """Processor's time of this process without compiling, seconds."""
-    return processor_time() - compile_seconds()
+    """Processor's time of this thread without compiling, seconds."""
+    return time.thread_time() - compile_seconds("thread_time")
 
 
 def _goals(goal: Any) -> tuple[Goal, ...]:

@@ -74,6 +74,8 @@ def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, dam
         counts.append(len(gap))
     ways = np.array([turn @ pin.difference(model, *pair) for turn, pair in zip(turns, pairwise(band), strict=False)])
     lengths = np.linalg.norm(ways, axis=1)
+    if not lengths.any():  # it stays
+        return None
     weights = lengths.mean() / np.maximum(lengths, 0.3 * lengths.mean())  # bounded where a motion is short
     stiff = np.diag(weights[:-1] + weights[1:] + damping) - np.diag(weights[1:-1], 1) - np.diag(weights[1:-1], -1)
     spread = np.linalg.inv(stiff)

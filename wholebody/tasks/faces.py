@@ -108,10 +108,12 @@ def back_above(scene: Scene, name: str, seat: Face, state: State, where: str) ->
 
 
 def _with_faces(scene: Scene, name: str, where: str) -> Surface:
-    """The surface of a thing that is no frame."""
+    """The surface of a thing that is no frame, nor endless with other pieces."""
     found = surface(scene, name, where)
     if found.fixed is not None:
         raise InputError(f"{where}: {shown(name)} is a frame and has no face; name a thing or a segment")
+    if len(found.shapes) > 1 and any(isinstance(shape, coal.Halfspace) for shape in found.shapes):
+        raise InputError(f"{where}: {shown(name)} has a half-space among its pieces; name one, as {name + ':0'!r}")
     return found
 
 
@@ -170,10 +172,10 @@ def _flats(
     for number in np.argsort(sizes)[::-1].tolist():
         if sizes[number] < SMALLER * largest:
             break
-        flat = _exposed(groups[number], solids, counts)
-        if flat is not None:
-            largest = max(largest, flat.area)
-            found.append(flat)
+        seen = _exposed(groups[number], solids, counts)
+        if seen is not None:
+            largest = max(largest, seen.area)
+            found.append(seen)
     return found
 
 
