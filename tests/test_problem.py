@@ -23,7 +23,7 @@ GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
 @pytest.mark.parametrize(
     ("given", "error", "sentence"),
     [
-        ({"start": np.zeros(55)}, wb.InputError, r"start has shape \(56,\), not \(55,\)"),
+        ({"start": np.zeros(55)}, wb.InputError, r"start has shape \(55,\); give \(56,\)"),
         ({"start": np.full(56, np.nan)}, wb.InputError, "start entry 0 is not finite"),
         ({"start": np.ones(56)}, wb.InputError, "quaternion is not of unit length"),
         ({"start": "stading"}, wb.UnknownNameError, "did you mean standing"),

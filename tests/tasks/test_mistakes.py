@@ -18,7 +18,8 @@ NAN = float("nan")
     [
         (lambda: tasks.Point("tip", (550.0, -250.0, 950.0)), r"Point\('tip'\): target is 1126 m away; .* millimetres"),
         (lambda: tasks.Point("tip", (0.0, NAN, 0.0)), r"Point\('tip'\): target is .*nan.*; give finite numbers"),
-        (lambda: tasks.Point("tip", (0.0, 1.0)), r"Point\('tip'\): target has shape \(3,\), not \(2,\)"),
+        (lambda: tasks.Point("tip", (0.0, 1.0)), r"Point\(.tip.\): target has shape \(2,\); give 3 numbers"),
+        (lambda: tasks.Point("tip", (True, 0.0, 1.0)), r"target is \(True, 0.0, 1.0\), of which one is no number"),
         (lambda: tasks.Point("tip", (0, 0, 0), weight=-1), "weight is -1; give a positive number"),
         (lambda: tasks.Frame("tip", (0, 0, 0, 0, 0, 0, 2)), r"Frame\('tip'\): target.*quaternion"),
         (lambda: tasks.Orientation("tip", (0, 0, 0, 0.5)), "quaternion"),
@@ -39,7 +40,7 @@ def test_other_mistakes_are_found_when_the_figure_is_known(humanoid: Any) -> Non
     q = humanoid.figure.neutral
     with pytest.raises(UnknownNameError, match="Posture: no posture is called 'standin'; did you mean standing"):
         tasks.Posture("standin").resolve(humanoid, q)
-    with pytest.raises(InputError, match=r"Posture: target has shape \(35,\)"):
+    with pytest.raises(InputError, match=r"Posture: target has shape \(34,\); give 35 numbers"):
         tasks.Posture(q[1:]).resolve(humanoid, q)
     with pytest.raises(InputError, match="quaternion that is not of unit length"):
         tasks.Posture(2.0 * q).resolve(humanoid, q)

@@ -250,6 +250,8 @@ def array(value: object, what: str, wanted: str) -> Array:
         found = np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError):
         found = np.empty(0, dtype=object)
+    if isinstance(value, (tuple, list)) and any(one is True or one is False for one in value):  # numpy counts it as 1
+        raise InputError(f"{what} is {shown(value)}, of which one is no number; give {wanted}")
     if found.dtype.kind == "O" and found.size and all(isinstance(one, Number) for one in found.flat):
         real_ones = [_real(one) for one in found.flat]  # fractions and decimals
         if None not in real_ones:
@@ -268,7 +270,7 @@ def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
         found = array(value, what, f"numbers of shape {shape}" if shape else "one number")
         found = found if type(value) in (tuple, list) else found.copy()
     if found.shape != shape:
-        raise InputError(f"{what} has shape {shape}, not {found.shape}; give {math.prod(shape)} numbers")
+        raise InputError(f"{what} has shape {found.shape}; give {math.prod(shape)} numbers, shape {shape}")
     if not math.isfinite(np.vdot(found, found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         raise InputError(f"{what} is {shown(found.tolist())}; give finite numbers")
     found.setflags(write=False)
@@ -282,7 +284,7 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
         return value  # type: ignore[return-value] # told in a third of the time
     found = array(value, what, f"{size} numbers; start from figure.posture(...)")
     if found.shape != (size,):
-        raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
+        raise InputError(f"{what} has shape {found.shape}; give ({size},), from figure.posture(...)")
     if not math.isfinite(found.dot(found)) and not np.isfinite(found).all():  # the first takes a fifth of the time
         wrong = int(np.flatnonzero(~np.isfinite(found))[0])
         raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")

@@ -185,7 +185,7 @@ class ReachCone:
         """Angle of a direction (3,) to the nearest edge, radians, positive inside, and its gradient (3,), a tangent."""
         direction = _unit(direction, "direction")
         if direction.shape != (3,):
-            raise InputError(f"a direction has shape (3,), not {direction.shape}")
+            raise InputError(f"a direction has shape {direction.shape}; give (3,)")
         height, before, after, corner, side = (self.planes @ direction).reshape(5, -1).tolist()
         edge, following, nearness, crossed = 0, 0, -inf, 0
         last = len(height) - 1
