@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -182,3 +183,26 @@ def test_who_sits_on_a_floor_begins_where_the_start_is() -> None:
     found = wb.solve(problem)
     assert found.status == "solved"
     assert np.linalg.norm(found.q[:2] - problem.start[:2]) < 1.0
+
+
+CART = """<robot name="cart"><link name="ground"/><link name="cart"><inertial><mass value="20"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 0.3"/><geometry><box size="0.5 0.4 0.5"/></geometry></collision></link><link name="tip"/>
+<joint name="drive" type="planar"><parent link="ground"/><child link="cart"/><axis xyz="0 0 1"/></joint>
+<joint name="at" type="fixed"><parent link="cart"/><child link="tip"/><origin xyz="0.25 0 0.6"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("what", ["cart", "hand", "human"])
+def test_goals_behind_a_wall_are_found_by_what_moves_freely(tmp_path: Path, what: str) -> None:
+    """Starts moved carts and roots by 0.1 m, and a goal 5 m away behind a wall was called unreachable."""
+    path = tmp_path / "cart.urdf"
+    path.write_text(CART)
+    scene = wb.Scene(wb.load(path if what == "cart" else what)).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.1, 3.0, 2.5)), name="wall", at=(1.3, 0.0, 1.25))
+    frame = {"cart": "tip", "hand": "right_palm", "human": "right_index_tip"}[what]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # nothing holds them
+        found = wb.solve(wb.Problem(scene, goals=[wb.Point(frame, (5.0, 0.3, 0.6))]))
+    assert found.status == "solved", found.message
+    assert found.q[0] > 3.0
+    assert not scene.penetration(found.q) or scene.penetration(found.q)[0].depth < 1e-4

@@ -240,13 +240,29 @@ def alike(ends: Sequence[float]) -> bool:
 def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
     """The least and the largest move (nv,) of each degree of freedom from a posture (nq,), all of them finite."""
     lower, upper = problem.scene.figure.tangent_bounds(start)
-    # m and rad, for joints without limits, but those that turn about one axis
-    spread = np.full(len(lower), 0.2)
-    for joint in list(problem.scene.model.joints)[1:]:  # the first is the world
-        if joint.shortname().startswith("JointModelR"):
-            spread[joint.idx_v] = TURN
+    # m and rad, for joints without limits, but those that turn about one axis, or carry a figure to its goals
+    spread, figure, missed = np.full(len(lower), 0.2), problem.scene.figure, _missed(problem, start)
+    # m: what is nearer is in the reach of limbs
+    free = set() if problem.stated or problem.bounds or missed < 1.0 else set(figure.roots.values())
+    for number, joint in enumerate(figure.model.joints):
+        kind, first = joint.shortname(), joint.idx_v
+        if number and kind.startswith("JointModelR"):  # the first is the world
+            spread[first] = TURN
+        elif kind == "JointModelPlanar":
+            spread[first : first + 3] = *2 * [max(0.2, 2.0 * missed)], TURN
+        elif kind.startswith("JointModelP"):
+            spread[first] = max(0.2, 2.0 * missed)
+        elif number in free:
+            spread[first : first + 3] = 2.0 * missed
     limited = np.isfinite(upper - lower)
     return np.where(limited, lower, -0.5 * spread), np.where(limited, upper, 0.5 * spread)
+
+
+def _missed(problem: Problem, start: Array) -> float:
+    """The farthest that a goal is from being met at a posture (nq,), metres."""
+    with problem.scene.figure.posed(start) as state:
+        missed = [np.where(goal.angular, 0.0, goal.error(state)) for goal in problem.goals]
+    return max((float(np.linalg.norm(each)) for each in missed), default=0.0)
 
 
 def _moved(problem: Problem, state: State, start: Array, move: Array) -> Array:
