@@ -260,7 +260,7 @@ def test_postures_that_are_no_numbers_are_refused(free_bodies, value):
             scene.contacts(q)
     with pytest.raises(wb.InputError, match="within is "):
         scene.contacts(scene.figure.neutral, value)
-    with pytest.raises(wb.InputError, match=r"shape \(7,\), not \(6,\)"):
+    with pytest.raises(wb.InputError, match=r"has shape \(6,\); give \(7,\)"):
         scene.contacts(np.zeros(6))
 
 
