@@ -241,19 +241,23 @@ def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
     """The least and the largest move (nv,) of each degree of freedom from a posture (nq,), all of them finite."""
     lower, upper = problem.scene.figure.tangent_bounds(start)
     # m and rad, for joints without limits, but those that turn about one axis, or carry a figure to its goals
-    spread, figure, missed = np.full(len(lower), 0.2), problem.scene.figure, _missed(problem, start)
-    # m: what is nearer is in the reach of limbs
-    free = set() if problem.stated or problem.bounds or missed < 1.0 else set(figure.roots.values())
+    spread, figure, carriers = np.full(len(lower), 0.2), problem.scene.figure, list[tuple[int, int, float]]()
+    free = set() if problem.stated or problem.bounds else set(figure.roots.values())
     for number, joint in enumerate(figure.model.joints):
         kind, first = joint.shortname(), joint.idx_v
         if number and kind.startswith("JointModelR"):  # the first is the world
             spread[first] = TURN
         elif kind == "JointModelPlanar":
-            spread[first : first + 3] = *2 * [max(0.2, 2.0 * missed)], TURN
+            carriers.append((first, 2, 0.1))
+            spread[first + 2] = TURN
         elif kind.startswith("JointModelP"):
-            spread[first] = max(0.2, 2.0 * missed)
+            carriers.append((first, 1, 0.1))
         elif number in free:
-            spread[first : first + 3] = 2.0 * missed
+            carriers.append((first, 3, 1.0))  # m: what is nearer is in the reach of limbs
+    missed = _missed(problem, start) if carriers else 0.0
+    for first, count, least in carriers:
+        if missed > least:
+            spread[first : first + count] = 2.0 * missed
     limited = np.isfinite(upper - lower)
     return np.where(limited, lower, -0.5 * spread), np.where(limited, upper, 0.5 * spread)
 

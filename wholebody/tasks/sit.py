@@ -35,7 +35,7 @@ class Sit(ContactTerm):
     or before the knees is then what dimensions of sitting people say; who may slouch or spread fits elsewhere too.
 
     Attributes:
-        on: the seat: a thing, whose largest flat face that looks up is sat on, or a piece of one such as "chair:2".
+        on: the seat: a thing, of which the highest broad face is sat on, or a piece of one such as "chair:2".
         back: what the back is at, the same thing where seat and backrest are one mesh; None for a stool.
         pelvis: the segment that sits.
         trunk: the last of the segments above the pelvis that may touch the back.
@@ -43,7 +43,7 @@ class Sit(ContactTerm):
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
 
     Raises:
-        InputError: a value of the wrong kind, shape or range; in a problem, a seat that is to be the back has none.
+        InputError: a value of the wrong kind, shape or range; in a problem, a thing that is its own back has none.
         UnknownNameError: in a problem, a name that the scene does not have.
 
     Examples:
