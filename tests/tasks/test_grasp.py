@@ -138,14 +138,17 @@ def test_derivative_of_a_hand_about_to_close(figure: wb.Figure) -> None:
     assert np.abs(given[0]) > 1e-3
 
 
-def test_around_a_thin_bar_the_fingers_oppose_the_palm(figure: wb.Figure) -> None:
-    scene = wb.Scene(figure).add(wb.Capsule(0.01, 0.3), name="thing", at=AT)
+@pytest.mark.parametrize("radius", [0.01, 0.006, 0.002], ids=["stick", "handle of a drawer", "cord"])
+def test_around_a_thin_bar_the_fingers_oppose_the_palm(figure: wb.Figure, radius: float) -> None:
+    scene = wb.Scene(figure).add(wb.Capsule(radius, 0.3), name="thing", at=AT)
     problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
     solution = wb.solve(problem, wb.methods.QP(measures=False))
     assert solution.status == "solved", solution.message
-    palm = _normal(scene, solution.q, "right_hand")
-    mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
-    assert _apart(palm, mean) > 135.0 - 0.1
+    distance, palm = _nearest(scene, solution.q, "right_hand")
+    assert distance < max(0.016 - 2 * radius, 0.0) + 2e-5
+    fingers = [_nearest(scene, solution.q, _outer(finger)) for finger in FOUR]
+    assert max(abs(found[0]) for found in fingers) < 2e-5  # each touches the bar
+    assert _apart(palm, np.sum([found[1] for found in fingers], axis=0)) > 135.0 - 0.1
 
 
 def test_fingers_on_one_side_do_not_oppose(figure: wb.Figure) -> None:

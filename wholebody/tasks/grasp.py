@@ -17,7 +17,7 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Near, Over, Part, owner_pairs
 from wholebody.tasks.faces import face
 from wholebody.tasks.grips import Crossing, Looking, Opposing, bar_of, rim_of, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, joined, segments_beyond, surface
@@ -43,7 +43,8 @@ class Grasp(ContactTerm):
     - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
       touches the thing. A ring, such as a wheel, is held by its rim, with the palm outside of it. Where the hand has
       fingers, the two outer parts of each touch the thing too, and the thumb opposes the four fingers; around a bar
-      thinner than 23 mm the thumb lies over the fingers, which oppose the palm.
+      thinner than 23 mm the thumb lies over the fingers, which oppose the palm. One thinner than 16 mm lies in the
+      fingers: its far side is at most 16 mm from the palm.
     - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the figure has such
       segments, otherwise their tips, which have to move apart.
     - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
@@ -154,7 +155,8 @@ class Grasp(ContactTerm):
         # and thicker ones, around which the thumb reaches less.
         room = (0.05 - thickness if thickness < 0.05 else 0.03) if fingers and thickness >= THIN else 0.0
         parts: list[Part] = [
-            Gap(hand, thing),
+            # m: thickness that closed fingers leave in front of the palm; a thinner bar lies in the fingers
+            Near(hand, thing, 0.016 - thickness) if fingers and thickness < 0.016 else Gap(hand, thing),
             Facing(place, across(y), bar, z, either=True),
             Crossing(place, bar, low, high, room),
         ]
