@@ -231,6 +231,7 @@ def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsReco
         first, last, far = map(
             int, re.findall(rf"{side}_wrist does not reach box in frames (\d+) to (\d+) .*? (\d+) mm", told)[0]
         )
+        assert first > 15  # the box is in reach for longer than half of the clip
         assert last == len(clip) - 1
         assert away[:first].max() < 5e-3
         assert far == round(1e3 * away.max())
