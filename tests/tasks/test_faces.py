@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.geometry.shapes import Compound
 from wholebody.scene.scene import Scene
-from wholebody.tasks.faces import UP, back_above, bearing_face
+from wholebody.tasks.faces import UP, back_above, face
 
 SEAT, BACK = (0.40, 0.44, 0.05), (0.04, 0.44, 0.50)  # m: sizes of boards
 LEGS = [((0.04, 0.04, 0.38), (x, y, 0.19)) for x in (-0.18, 0.18) for y in (-0.2, 0.2)]
@@ -36,7 +36,7 @@ def beside(thing: object, at: pin.SE3) -> Scene:
 
 def seat_of(scene: Scene, direction: Array = UP) -> tuple[Array, Array, Array]:
     with scene.figure.posed(scene.figure.neutral) as state:
-        found = bearing_face(scene, "thing", direction, state, "here")
+        found = face(scene, "thing", direction, state, "here")
         middle, axes = found.at(state)
         return middle, axes[2], found.half
 
@@ -57,7 +57,7 @@ def test_the_back_of_a_chair_looks_over_its_seat() -> None:
     at = placed(2.0)
     scene = beside(made(*CHAIR, *ARMS), at)
     with scene.figure.posed(scene.figure.neutral) as state:
-        seat = bearing_face(scene, "thing", UP, state, "here")
+        seat = face(scene, "thing", UP, state, "here")
         back, behind = back_above(scene, "thing", seat, state, "here")
         middle, axes = back.at(state)
     np.testing.assert_allclose(at.actInv(middle)[:2], (-0.16, 0.0), atol=0.02)
@@ -130,3 +130,20 @@ def test_of_a_thing_with_a_half_space_one_piece_is_named() -> None:
     with pytest.raises(wb.InputError, match=r"half-space among its pieces; name one, as 'thing:0'"):
         wb.Problem(scene, goals=[wb.Sit(on="thing")])
     assert wb.Problem(scene, goals=[wb.Sit(on="thing:0")]).goals
+
+
+def test_a_palm_lies_on_a_desk_and_not_on_what_stands_on_it() -> None:
+    """A desk with a screen in one mesh; and a wall with a narrow ledge to lean at."""
+    desk = made(((0.8, 1.6, 0.03), (0.0, 0.0, 0.735)), ((0.05, 0.5, 0.35), (0.2, 0.0, 0.925)))
+    wall = made(((0.1, 2.0, 2.0), (0.0, 0.0, 1.0)), ((0.15, 2.0, 0.04), (0.12, 0.0, 1.9)))
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(desk, name="desk", at=(0.55, 0.0, 0.0)).add(wall, name="wall", at=(-0.5, 0.0, 0.0))
+    feet = [wb.tasks.Stand(on="floor")]
+    laid = wb.solve(wb.Problem(scene, goals=[wb.Grasp("right", "desk", side=(0, 0, 1))], constraints=feet))
+    assert laid.status == "solved", laid.message
+    below = scene.figure.placement(laid.q, "right_palm").translation
+    assert 0.75 < below[2] < 0.79  # the desk is 0.75 m high
+    leaning = wb.solve(wb.Problem(scene, goals=[wb.tasks.Lean("wall")], constraints=feet))
+    assert leaning.status == "solved", leaning.message
+    touching = [{scene.piece_owner[piece] for piece in pair} for pair in scene.contacts(leaning.q, within=1e-4).pair]
+    assert {"thorax", "wall"} in touching  # its chest is below the ledge

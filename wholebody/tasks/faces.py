@@ -1,4 +1,4 @@
-"""Flat faces of things: where somebody sits, stands or leans."""
+"""Flat faces of things: where somebody sits, stands, leans or lays a hand."""
 
 from __future__ import annotations
 
@@ -40,35 +40,11 @@ class Face(NamedTuple):
 
 
 def face(scene: Scene, name: str, direction: Array, state: State, where: str) -> Face:
-    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest."""
-    found = _with_faces(scene, name, where)
-    place = found.placed(0, state)
-    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Halfspace):
-        normal = np.array(found.shapes[0].n)
-        return Face(found, normal * float(found.shapes[0].d), across(normal), np.full(2, np.inf))
-    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Box):
-        half = np.array(found.shapes[0].halfSide)
-        along = place.rotation.T @ direction
-        axis = int(np.argmax(np.abs(along)))
-        normal = np.eye(3)[axis] * (1.0 if along[axis] >= 0.0 else -1.0)
-        others = [k for k in range(3) if k != axis]
-        return Face(found, normal * half[axis], np.array([*np.eye(3)[others], normal]), half[others])
-    everything = _ends(found, direction, state)
-    height = everything @ direction
-    # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
-    top = everything[height >= height.max() - 2e-3]
-    axes = across(direction)
-    flat = top @ axes[:2].T
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    center = axes[:2].T @ (0.5 * (low + high)) + direction * height.max()
-    return Face(found, place.actInv(center), axes @ place.rotation, 0.5 * (high - low))
+    """The face of a thing that looks towards a direction, to lay a palm on, to sit on, to stand on or to lean at.
 
-
-def bearing_face(scene: Scene, name: str, direction: Array, state: State, where: str) -> Face:
-    """The face of a thing to sit on, to stand on or to be the back at; of what is a box, or round, that of `face`.
-
-    Of flat faces within 45 degrees of the direction those count that have two fifths of the area of the largest: a seat
-    and not the narrow top of its backrest. Of these, it is the one that reaches farthest.
+    Of a box it is the nearest one, of what is round where it reaches farthest. Of other flat faces within 45 degrees of
+    the direction those count that have two fifths of the area of the largest: a seat and not the narrow top of its
+    backrest, a desk and not the screen on it. Of these, it is the one that reaches farthest.
     """
     found = _with_faces(scene, name, where)
     if len(found.shapes) > 1 or isinstance(found.shapes[0], coal.Convex):
@@ -78,7 +54,7 @@ def bearing_face(scene: Scene, name: str, direction: Array, state: State, where:
         least = max([SMALLER * one.area for one in flat] + [0.1 * float(np.prod(shadow))])
         if wide := [one for one in flat if one.area >= least]:
             return _placed(scene, found, max(wide, key=lambda one: float(one.center @ direction)), state)
-    return face(scene, name, direction, state, where)
+    return _extreme(found, direction, state)
 
 
 def back_above(scene: Scene, name: str, seat: Face, state: State, where: str) -> tuple[Face, Surface]:
@@ -105,6 +81,30 @@ def back_above(scene: Scene, name: str, seat: Face, state: State, where: str) ->
         if above(corners).any() and ahead.max() < 0.1:  # m: rests for arms reach farther
             behind.add(number)
     return _placed(scene, found, largest, state), _part(scene, found, behind)
+
+
+def _extreme(found: Surface, direction: Array, state: State) -> Face:
+    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest."""
+    place = found.placed(0, state)
+    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Halfspace):
+        normal = np.array(found.shapes[0].n)
+        return Face(found, normal * float(found.shapes[0].d), across(normal), np.full(2, np.inf))
+    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Box):
+        half = np.array(found.shapes[0].halfSide)
+        along = place.rotation.T @ direction
+        axis = int(np.argmax(np.abs(along)))
+        normal = np.eye(3)[axis] * (1.0 if along[axis] >= 0.0 else -1.0)
+        others = [k for k in range(3) if k != axis]
+        return Face(found, normal * half[axis], np.array([*np.eye(3)[others], normal]), half[others])
+    everything = _ends(found, direction, state)
+    height = everything @ direction
+    # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
+    top = everything[height >= height.max() - 2e-3]
+    axes = across(direction)
+    flat = top @ axes[:2].T
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    center = axes[:2].T @ (0.5 * (low + high)) + direction * height.max()
+    return Face(found, place.actInv(center), axes @ place.rotation, 0.5 * (high - low))
 
 
 def _with_faces(scene: Scene, name: str, where: str) -> Surface:

@@ -120,7 +120,7 @@ class Grasp(ContactTerm):
         check_apart(hand, thing, where)
         with scene.figure.posed(start) as state:
             if self.kind == "palm":
-                parts = self._palm(scene, place, hand, thing, state, where)
+                parts = self._palm(scene, place, hand, state, where)
             elif self.kind == "power":
                 parts = self._power(scene, place, hand, thing, state, where)
             else:
@@ -132,13 +132,11 @@ class Grasp(ContactTerm):
             parts.append(Looking(place, up, pi / 4, level=not height))
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 
-    def _palm(
-        self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
-    ) -> list[Part]:
+    def _palm(self, scene: Scene, place: inputs.Place, hand: Surface, state: State, where: str) -> list[Part]:
         outwards = self._outwards(scene, state) if self.side is None else np.asarray(self.side)
         taken = face(scene, self.thing, outwards, state, where)
         facing = Facing(place, across(np.array((0.0, 0.0, 1.0))), taken, np.array((0.0, 0.0, -1.0)))
-        return [Gap(hand, thing, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
+        return [Gap(hand, taken.surface, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
 
     def _power(
         self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str

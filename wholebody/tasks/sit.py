@@ -18,7 +18,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Made, Near, Over, Part, owner_pairs
-from wholebody.tasks.faces import UP, Face, back_above, bearing_face
+from wholebody.tasks.faces import UP, Face, back_above, face
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_on, surface
 
 
@@ -72,7 +72,7 @@ class Sit(ContactTerm):
 
     def _between(self, scene: Scene, where: str, state: State, rest: State) -> Made:
         place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
-        seat = bearing_face(scene, self.on, UP, state, where)
+        seat = face(scene, self.on, UP, state, where)
         thighs = inputs.once(scene, ("thighs", place.joint, trunk.joint), lambda: _thighs(scene, place, trunk))
         bottom = joined(scene, self.pelvis, [self.pelvis, *thighs])
         if not bottom.pieces:
@@ -108,7 +108,7 @@ class Sit(ContactTerm):
         if back == self.on:
             return back_above(scene, back, seat, state, where)
         whole, middle = surface(scene, back, where), seat.at(state)[0]
-        return bearing_face(scene, back, _level(middle - _middle(whole, state, middle), where), state, where), whole
+        return face(scene, back, _level(middle - _middle(whole, state, middle), where), state, where), whole
 
     def _measured(self, scene: Scene, place: inputs.Place, where: str) -> AtAngles:
         """Hips, spine and neck as in the posture of people who are measured: sitting, with parallel thighs."""

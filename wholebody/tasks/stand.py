@@ -22,7 +22,7 @@ from wholebody.tasks.balance import STANDING_HEIGHT, STEADY, Feet, Margin, SoleP
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Facing, Gap, Made, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
-from wholebody.tasks.faces import UP, bearing_face
+from wholebody.tasks.faces import UP, face
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_beyond, segments_on, surface
 
 STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
@@ -81,7 +81,7 @@ class Stand(TermOfParts):
         return filled(self, parts=parts, touches=touches, keeps=keeps)
 
     def _between(self, scene: Scene, where: str, state: State, rest: State) -> Made:
-        ground = bearing_face(scene, self.on, UP, state, where)
+        ground = face(scene, self.on, UP, state, where)
         thing = ground.surface
         parts: list[Part] = []
         touches: tuple[tuple[str, str], ...] = ()

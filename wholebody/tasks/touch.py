@@ -122,7 +122,7 @@ class Lean(ContactTerm):
             toward = state.frame(place.frame).rotation @ self.resolved_side
             leaned_on = face(scene, self.on, -toward, state, where)
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
-        parts = (Gap(first, second, leaned_on), facing)
+        parts = (Gap(first, leaned_on.surface, leaned_on), facing)
         return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))
 
 
