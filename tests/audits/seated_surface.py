@@ -22,7 +22,7 @@ import wholebody as wb
 from tests.measuring import measure
 from wholebody.base.arrays import Array
 from wholebody.figures.surface import surface_of
-from wholebody.figures.surface.making import halfway
+from wholebody.figures.surface.garments import halfway
 
 RIGHT_ANGLES = {
     f"{side}_{joint}": radians(90.0)
@@ -44,7 +44,7 @@ def drawn(figure: wb.Figure, data: pin.Data) -> Points:
         data.oMi[figure.model.getJointId(name)].homogeneous @ at for name, at in surface.attached(figure, np.eye(4))
     ]
     for number, first, second in surface.halves:
-        bones[number] = halfway(bones[first], bones[second], surface.bones[number].slide)
+        bones[number] = halfway(bones[first], bones[second], surface.bones[number])
     moves = np.array([now @ np.linalg.inv(bone.bind) for now, bone in zip(bones, surface.bones, strict=True)])
     for patch in surface.patches:
         points = np.column_stack((patch.vertices, np.ones(len(patch.vertices))))

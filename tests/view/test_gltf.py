@@ -18,7 +18,7 @@ import wholebody as wb
 from tests.flesh import settle
 from wholebody.cli import main
 from wholebody.figures.surface import surface_of
-from wholebody.figures.surface.making import halfway
+from wholebody.figures.surface.garments import halfway
 from wholebody.geometry.gltf import GltfDocument
 from wholebody.motion.files.gltf import triangles
 from wholebody.motion.files.gltf_reading import Animated
@@ -64,7 +64,7 @@ def bent(figure: wb.Figure, q: np.ndarray) -> np.ndarray:
         placed.append(data.oMi[figure.model.getJointId(joint)].homogeneous @ offset)
         if bone.parent is not None:
             first = placed[[other.segment for other in surface.bones].index(bone.parent)]
-            placed[-1] = halfway(first, placed[-1], bone.slide)
+            placed[-1] = halfway(first, placed[-1], bone)
     moved = [at @ np.linalg.inv(bone.bind) for at, bone in zip(placed, surface.bones, strict=True)]
     found = {}
     for patch in surface.patches:

@@ -44,7 +44,11 @@ class Skin:
     def build(self, graph: SceneGraph, root: str, carriers: Mapping[str, str], color: Color | None) -> list[Skinned]:
         """Put the surface at a node, moved by the nodes of its joints; in a colour, or each patch in its own."""
         bones = self.surface.bones
-        halves = [(*half, *bones[half[0]].slide) for half in self.surface.halves]
+        halves = [
+            (*half, *bone.slide, bone.turn.share, bone.turn.twist, *(bone.turn.aside or ()))
+            for half in self.surface.halves
+            for bone in (bones[half[0]],)
+        ]
         places, binds = np.array([offset for _, offset in self.places]), np.array([bone.bind for bone in bones])
         nodes = [carriers[joint] for joint, _ in self.places]
         graph.do(commands.set_skeleton(root, nodes, places, np.linalg.inv(binds), halves))

@@ -44,8 +44,8 @@ def set_skeleton(
     """Put a skeleton at a node: bones that follow other nodes, and bend the skins that name it.
 
     Each of n bones has its carrier, `offsets` (n, 4, 4) from it, and `inverses` (n, 4, 4) where the skin was bound;
-    `halves` turn half way between two others: index of the bone, of the first and of the second, its origin, and its
-    slide (3,), as `Bone` has it.
+    `halves` turn between two others: index of the bone, of the first and of the second, its origin, its slide (3,),
+    shares of the turn and the twist and, if any, the direction (3,) from which that counts, as `Bone` has them.
     """
     message = {
         "type": "skeleton",

@@ -138,16 +138,25 @@
     const made = new THREE.Skeleton(nodes.map(() => new THREE.Bone()), matrices(cmd.inverses));
     const first = new THREE.Quaternion(), second = new THREE.Quaternion();
     const at = new THREE.Vector3(), size = new THREE.Vector3(), nowhere = new THREE.Vector3();
-    const up = new THREE.Vector3(), other = new THREE.Vector3();
+    const up = new THREE.Vector3(), other = new THREE.Vector3(), down = new THREE.Vector3(0, 0, -1);
+    const turn = new THREE.Quaternion(), swing = new THREE.Quaternion(), twist = new THREE.Quaternion();
     const update = made.update.bind(made);
     made.update = function () {
       nodes.forEach((node, k) => made.bones[k].matrixWorld.multiplyMatrices(node.matrixWorld, offsets[k]));
-      for (const [half, from, to, ...slide] of cmd.halves) {
+      for (const [half, from, to, x, y, z, share, twists, ...aside] of cmd.halves) {
         made.bones[from].matrixWorld.decompose(nowhere, first, size);
         made.bones[to].matrixWorld.decompose(at, second, size);
         const bent = 1 - up.set(0, 0, 1).applyQuaternion(first).dot(other.set(0, 0, 1).applyQuaternion(second));
-        first.slerp(second, 0.5);
-        at.add(up.fromArray(slide).multiply(size).multiplyScalar(bent).applyQuaternion(first));
+        if (aside.length) {
+          turn.copy(first).invert().multiply(second);
+          up.fromArray(aside);
+          swing.setFromUnitVectors(up, other.copy(down).applyQuaternion(turn));
+          swing.multiply(twist.setFromUnitVectors(down, up));
+          twist.copy(swing).invert().multiply(turn);
+          second.copy(first).multiply(swing).multiply(turn.identity().slerp(twist, twists));
+        }
+        first.slerp(second, share);
+        at.add(up.set(x, y, z).multiply(size).multiplyScalar(bent).applyQuaternion(first));
         made.bones[half].matrixWorld.compose(at, first, size);
       }
       update();

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 from tests.audits.seated_surface import differences, drawn
 from wholebody.base.arrays import Array
 from wholebody.figures import load
-from wholebody.figures.surface.making import halfway
+from wholebody.figures.surface.garments import Bone, Turn, halfway, turned
 
 FINE_SURFACES = True
 
@@ -60,15 +60,16 @@ def test_who_sits_is_as_broad_as_people_are_on_a_seat(who: str) -> None:
 
 
 def test_a_half_bone_slides_by_the_cosine() -> None:
-    slide, place = np.array([0.01, 0.02, 0.03]), np.array([0.5, 0.0, 1.0])
+    slide, place = (0.01, 0.02, 0.03), np.array([0.5, 0.0, 1.0])
+    bone = Bone("shank", "thigh", None, np.eye(4), np.eye(4), slide)
     for degrees, share in ((0.0, 0.0), (60.0, 0.5), (90.0, 1.0)):
         second = pin.SE3(pin.rpy.rpyToMatrix(0.0, radians(degrees), 0.0), place).homogeneous
         turn = pin.rpy.rpyToMatrix(0.0, radians(0.5 * degrees), 0.0)
-        found = halfway(np.eye(4), second, slide)
+        found = halfway(np.eye(4), second, bone)
         np.testing.assert_allclose(found[:3, :3], turn, atol=1e-12)
         np.testing.assert_allclose(found[:3, 3], place + share * turn @ slide, atol=1e-12)
     about = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 1.0), place).homogeneous  # a turn about the limb moves no flesh
-    np.testing.assert_allclose(halfway(np.eye(4), about, slide)[:3, 3], place, atol=1e-12)
+    np.testing.assert_allclose(halfway(np.eye(4), about, bone)[:3, 3], place, atol=1e-12)
 
 
 @pytest.mark.parametrize(("flexion", "abduction"), [(165.0, 15.0), (0.0, 155.0)])
@@ -84,3 +85,20 @@ def test_no_flesh_of_a_raised_arm_hangs_below_the_shoulder(flexion: float, abduc
     assert person is not None
     below = data.oMf[figure.frame_id("left_shoulder")].translation[2] - lowest
     assert below < person.radius("upper_arm") + 0.03
+
+
+def test_flesh_of_a_shoulder_swings_with_the_arm_and_does_not_twist() -> None:
+    rng, aside = np.random.default_rng(4), (0.0, 0.8, -0.6)
+    down = np.array((0.0, 0.0, -1.0))
+    for _ in range(20):
+        whole = pin.exp3(rng.uniform(-1.5, 1.5, 3))
+        about = pin.exp3(rng.uniform(-1.5, 1.5) * down)
+        swing = turned(whole, Turn(1.0, 0.0, aside))
+        np.testing.assert_allclose(swing @ down, whole @ down, atol=1e-12)  # it points where the arm does
+        np.testing.assert_allclose(turned(whole @ about, Turn(1.0, 0.0, aside)), swing, atol=1e-12)
+        half = turned(whole, Turn(1.0, 0.5, aside))
+        np.testing.assert_allclose(half @ swing.T @ half, whole, atol=1e-9)  # the second half of the twist
+        np.testing.assert_allclose(turned(whole, Turn(1.0, 1.0, aside)), whole, atol=1e-12)
+    for degrees in (0.0, 70.0, 160.0):  # a swing through the direction aside has no twist
+        raised = pin.exp3(np.radians(degrees) * np.array((1.0, 0.0, 0.0)))
+        np.testing.assert_allclose(turned(raised, Turn(1.0, 0.0, aside)), raised, atol=1e-9)

@@ -15,6 +15,7 @@ from wholebody.figures import load
 from wholebody.figures import surface as surfaces
 from wholebody.figures.anthropometry import design_cases
 from wholebody.figures.surface import Bone, Surface, making, surface_of
+from wholebody.figures.surface.garments import halfway
 from wholebody.figures.surface.making import Part, person_parts
 from wholebody.figures.surface.person_shape import PersonShape
 from wholebody.geometry.mesh_cache import VARIABLE, cache_state
@@ -51,7 +52,7 @@ def bent(figure: Any, bones: Sequence[Bone], parts: Iterable[tuple[Any, Any]], q
         else:
             place = data.oMf[figure.frame_id(bone.instead)].homogeneous @ bone.rest
         if bone.parent is not None:
-            place = making.halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place, bone.slide)
+            place = halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place, bone)
         moved.append(place @ np.linalg.inv(bone.bind))
     found = []
     for vertices, weights in parts:

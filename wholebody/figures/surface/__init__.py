@@ -10,7 +10,7 @@ from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import urdf_text
 from wholebody.figures.figure import Figure
 from wholebody.figures.human.spec import human_spec
-from wholebody.figures.surface.garments import Bone, Patch, Surface
+from wholebody.figures.surface.garments import Bone, Patch, Surface, Turn
 from wholebody.geometry.mesh_cache import cached_entry
 
 __all__ = ["Bone", "Patch", "Surface", "surface_of"]
@@ -37,6 +37,7 @@ def _kept(person: Person, hand: str) -> Surface:
         return hand_surface(person, hand) if hand else person_surface(person)
 
     # The number is another one whenever a shape, a weight or the layout changes.
-    digest = hashlib.sha256(f"32 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
+    digest = hashlib.sha256(f"34 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
     bones, patches = cached_entry(digest.hexdigest(), make)
-    return Surface(tuple(Bone(*each) for each in bones), tuple(Patch(*each) for each in patches))
+    bones = [Bone(*each)._replace(turn=Turn(*each[-1])) for each in bones]
+    return Surface(tuple(bones), tuple(Patch(*each) for each in patches))

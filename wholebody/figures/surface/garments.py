@@ -6,11 +6,24 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.figures.description import Articulated
 from wholebody.figures.surface.fields import Field
+
+DOWN = np.array((0.0, 0.0, -1.0))  # along a limb, in its axes
+
+
+class Turn(NamedTuple):
+    """How much a half bone turns of what its segment turns against the parent, by swing and twist (Grassia 1998)."""
+
+    share: float = 0.5  # of the turn
+    # With a direction (3,) of the limb in the parent's axes, the limb's z axis swings from there by the shortest way,
+    # and of the twist about it there is a share too.
+    twist: float = 1.0
+    aside: tuple[float, float, float] | None = None
 
 
 class Bone(NamedTuple):
@@ -24,6 +37,29 @@ class Bone(NamedTuple):
     rest: Array  # (4, 4) placement relative to `instead` in such a figure
     # of a half, metres along its own axes by which it slides where `segment` is at a right angle to `parent`
     slide: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn: Turn = Turn()  # of a half
+
+
+def halfway(first: Array, second: Array, bone: Bone) -> Array:
+    """Placement (4, 4) of a half bone between two; its origin is the second's + `slide` (3,) (1 - cosine of z axes)."""
+    found = np.array(second)
+    found[:3, :3] = first[:3, :3] @ turned(first[:3, :3].T @ second[:3, :3], bone.turn)
+    found[:3, 3] += (1.0 - first[:3, 2] @ second[:3, 2]) * (found[:3, :3] @ np.asarray(bone.slide))
+    return found
+
+
+def turned(whole: Array, turn: Turn) -> Array:
+    """How much (3, 3) a half bone turns of what its segment turns against the parent (3, 3)."""
+    if turn.aside is not None:
+        aside = np.array(turn.aside)
+        swing = _shortest(aside, whole @ DOWN) @ _shortest(DOWN, aside)
+        whole = swing @ pin.exp3(turn.twist * pin.log3(swing.T @ whole))
+    return np.asarray(pin.exp3(turn.share * pin.log3(whole)))
+
+
+def _shortest(start: Array, end: Array) -> Array:
+    """The shortest turn (3, 3) from one unit vector (3,) to another."""
+    return np.asarray(pin.Quaternion.FromTwoVectors(start, end).matrix())
 
 
 class Patch(NamedTuple):

@@ -6,13 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.hand import FINGERS, PARTS
-from wholebody.figures.surface.garments import Bone, Claim, Garment, Patch, Surface, bounds
+from wholebody.figures.surface.garments import Bone, Claim, Garment, Patch, Surface, bounds, halfway
 from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.nets import Triangles, coarsened, triangles
 from wholebody.figures.surface.person_shape import COLORS, HALVES, PersonShape
@@ -41,9 +40,10 @@ def person_parts(person: Person) -> tuple[dict[str, Bone], list[Part]]:
     for side in ("left", "right"):
         for part, parent in HALVES.items():
             segment, other = f"{side}_{part}", parent if parent == "pelvis" else f"{side}_{parent}"
-            slide = shape.slide(side, part)
-            bind = halfway(shape.bind[other], shape.bind[segment], slide)
-            bones[segment + "/half"] = Bone(segment, other, None, bind, np.eye(4), slide)
+            for kind, turn in shape.turns(side, part).items():
+                bone = Bone(segment, other, None, np.eye(4), np.eye(4), shape.slide(side, part), turn)
+                bind = halfway(shape.bind[other], shape.bind[segment], bone)
+                bones[f"{segment}/{kind}"] = bone._replace(bind=bind)
         hand, frame = hand_shape(person, side), shape.bind[f"{side}_hand"]
         for finger, parts in FINGERS.items():
             for part in parts:
@@ -60,15 +60,6 @@ def hand_surface(person: Person, side: str) -> Surface:
     low, high = bounds(shape.corners, 0.035)
     garment = Garment(f"{side}_hand", COLORS.skin, shape.field, low, high, 0.0030, shape.claims)
     return _divided(bones, [_made(garment, bones)])
-
-
-def halfway(first: Array, second: Array, slide: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-    """Placement (4, 4) of a half bone at the second's origin + `slide` (3,) (1 - cosine of the z axes)."""
-    turn = pin.log3(first[:3, :3].T @ second[:3, :3])
-    found = np.array(second)
-    found[:3, :3] = first[:3, :3] @ pin.exp3(0.5 * turn)
-    found[:3, 3] += (1.0 - first[:3, 2] @ second[:3, 2]) * (found[:3, :3] @ np.asarray(slide))
-    return found
 
 
 def _made(garment: Garment, bones: Mapping[str, Bone]) -> Part:

@@ -26,7 +26,7 @@ from wholebody.figures.surface.fields import (
     union,
     without,
 )
-from wholebody.figures.surface.garments import Claim, Garment, bounds
+from wholebody.figures.surface.garments import Claim, Garment, Turn, bounds
 from wholebody.figures.surface.hand_shape import hand_shape
 from wholebody.figures.surface.head_shape import head_shape
 from wholebody.figures.surface.profile import RAYS, caps, limb, piece_field, trunk
@@ -93,7 +93,6 @@ class PersonShape:
         yield self._trousers()
         yield from self._head()
         for side, sign in SIDES:
-            yield self._latissimus(side)
             yield self._hand(side)
             yield self._shoe(side, sign)
 
@@ -142,8 +141,10 @@ class PersonShape:
             side, _, part = segment.partition("_")
             if part == "upper_arm":
                 # the shoulder's end of the arm turns with the shoulder: with the arm it would hang below a raised one
-                beyond = half_space(self.at(segment, (0.0, 0.0, -0.035 * self._scale)), self.bind[segment][:3, 2])
-                found.append(Claim(segment, intersection(self._limbs[segment], beyond), 0.020))
+                edges = [0.035 * self._scale, *(np.array((0.4, 0.7, 2.0)) * self.person.length(segment))]
+                for name, start, end in zip(("/swing", "/middle", ""), edges, edges[1:], strict=False):
+                    part_of_it = intersection(self._limbs[segment], self._stretch(segment, start, end))
+                    found.append(Claim(segment + name, part_of_it, 0.020))
                 found.append(Claim("thorax", grown(self._armpit(side)[1], -0.006), 0.022))
             elif segment in self._limbs:
                 found.append(Claim(segment, self._limbs[segment], 0.014))
@@ -161,6 +162,12 @@ class PersonShape:
                 reach = radius * self._scale
                 found.append(Claim(f"{segment}/half", grown(ball(self.at(segment), reach), 0.006)))
         return found
+
+    def _stretch(self, segment: str, start: float, end: float) -> Field:
+        """What lies along a segment between two distances from its joint."""
+        down = self.bind[segment][:3, 2]
+        beyond = half_space(self.at(segment, (0.0, 0.0, -start)), down)
+        return intersection(beyond, half_space(self.at(segment, (0.0, 0.0, -end)), -down))
 
     # ---- garments
 
@@ -224,16 +231,6 @@ class PersonShape:
             folds.append(round_cone(self.at(trunk_part, np.array(start) * scale), end, 0.032 * scale, radius))
         return folds
 
-    def _latissimus(self, side: str) -> Garment:
-        """The muscle from the flank to below the shoulder, which a hanging arm hides and a raised one shows."""
-        scale, sign = self._scale, dict(SIDES)[side]
-        shoulder, flank = self.at(f"{side}_upper_arm"), 0.5 * self.person.size("chest_breadth")
-        high = shoulder + np.array([-0.004, 0.012 * sign, -0.012]) * scale
-        low = np.array([shoulder[0] - 0.004, sign * (flank - 0.052 * scale), shoulder[2] - 0.23 * scale])
-        body = grown(round_cone(low, high, 0.050 * scale, 0.85 * self.person.radius("upper_arm")), CLOTH)
-        claims = [Claim("thorax", ball(low, 0.0), 0.03), Claim(f"{side}_clavicle", ball(high, 0.0), 0.03)]
-        return Garment(f"{side}_latissimus", COLORS.shirt, body, *bounds([low, high], 0.08 * scale), 0.012, claims)
-
     def _trousers(self) -> Garment:
         scale = self._scale
         halves = []
@@ -283,6 +280,15 @@ class PersonShape:
             return 0.0, 0.0, 0.0
         more, seat = self.person.size("hip_breadth_sitting") - self.person.size("hip_breadth"), self.person.size("seat")
         return 0.75 * seat, 0.7 * dict(SIDES)[side] * more, 1.1 * seat
+
+    @staticmethod
+    def turns(side: str, part: str) -> dict[str, Turn]:
+        """How the bones between a segment and that before it turn, by name."""
+        if part != "upper_arm":
+            return {"half": Turn()}
+        # The flesh of a shoulder follows where the arm points; how it is turned about itself shows along the arm.
+        aside = (0.0, dict(SIDES)[side] * float(np.sin(np.pi / 3)), -0.5)
+        return {"half": Turn(0.5, 0.0, aside), "swing": Turn(1.0, 0.0, aside), "middle": Turn(1.0, 0.5, aside)}
 
     def _calf(self, side: str, sign: float) -> Field:
         length, radius = self.person.length("left_shank"), self.person.radius("calf")

@@ -19,6 +19,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.joining import joint_in
 from wholebody.figures.link_pieces import Color, Drawn, drawn_of
 from wholebody.figures.surface import Surface, surface_of
+from wholebody.figures.surface.garments import Bone, halfway
 from wholebody.geometry.gltf import VERTICES, GltfBuilder
 from wholebody.geometry.placement import steady
 from wholebody.motion.files.base import Motion
@@ -109,7 +110,7 @@ class JointTree:
             called = f"{prefix}{bone.segment}"
             if number in whole:
                 first, second = whole[number]
-                keys = self._between(held[first], held[second], bone.slide)
+                keys = self._between(held[first], held[second], bone)
                 node = self.builder.moving_node(f"{called} half", bones[first], keys, self._times)
             else:
                 node = self.builder.node(called, self._nodes[joint], offset)
@@ -151,18 +152,14 @@ class JointTree:
             found.append(known.get(joint, above @ self._first[joint]))
         return found
 
-    def _between(
-        self, first: tuple[int, Array], second: tuple[int, Array], slide: Sequence[float]
-    ) -> tuple[Array, Array]:
+    def _between(self, first: tuple[int, Array], second: tuple[int, Array], bone: Bone) -> tuple[Array, Array]:
         """Rotations and places of a half bone in the first of its two, of joints and placements in them."""
         data, found = self._model.createData(), np.empty((len(self._q), 4, 4))
         for k, posture in enumerate(self._q):
             pin.forwardKinematics(self._model, data, posture)
             ends = [data.oMi[joint].homogeneous @ offset for joint, offset in (first, second)]
-            found[k] = np.linalg.solve(*ends)
-        half = Rotation.from_rotvec(0.5 * Rotation.from_matrix(found[:, :3, :3]).as_rotvec())
-        bent = 1.0 - found[:, 2, 2]
-        return steady(half.as_quat()), found[:, :3, 3] + bent[:, None] * half.apply(slide)
+            found[k] = halfway(np.eye(4), np.linalg.solve(*ends), bone)
+        return steady(Rotation.from_matrix(found[:, :3, :3]).as_quat()), found[:, :3, 3]
 
 
 def keys_of(model: Any, q: Array) -> tuple[Array, Array]:
