@@ -83,7 +83,7 @@ class NewtonMultistart(Multistart[SearchResult]):
         if not self.control.over:
             if not self.best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
                 self.accept(self._least_violation(q))
-            if self.solves(self.best) and self.active_system.objective.minimised:
+            if self.solves(self.best) and self.active_system.objective.measures:
                 self._refine()
         if self.solves(self.best):
             self.contradictions = ()  # by less than the tolerance
@@ -129,14 +129,13 @@ class NewtonMultistart(Multistart[SearchResult]):
 
     def _ending(self) -> Ending:
         """The best result as the end of the search."""
-        found, reported = self.best, ", ".join(self.active_system.objective.reported)
+        found = self.best
         return Ending(
             found.q,
             found.reached.stationary,
             self.iterations,
             tuple(TraceEntry(error, 0.0, 0.0, 0.0) for error in self.residuals),
             f"in {self.iterations} iterations{self.how}",
-            remark=f"; {reported} is reported, not minimised" if reported else "",
             contradictions=self.contradictions,
             judgement=found.judgement,
             method=f"newton/{self.active_system.algebra.name}",
