@@ -100,7 +100,7 @@ class FigureBodies:
 
     def displacement(self) -> DisplacementRows:
         """One row for each degree of freedom: the figure's displacement from a posture."""
-        return DisplacementRows(self.model, self.chart, lambda x: self.state_at(x).q)
+        return DisplacementRows(self.model, self.chart, self._posture)
 
     def choose_limits(self) -> None:
         """Set the rows of `limits` to the limits that are nearer at the last posture."""
