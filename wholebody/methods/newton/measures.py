@@ -156,7 +156,7 @@ class _Descent:
         change = self._least - value
         met = free and run.met
         if met and change > rounding:
-            return self._keep(value)
+            return self._keep(value, fast is None)
         self._memory.reset()
         run.begin(self.best)
         if run.system is not self._system:
@@ -168,8 +168,8 @@ class _Descent:
         self._share *= REFINEMENT.shorter
         return True
 
-    def _keep(self, value: float) -> bool:
-        """Take the state of the iteration, with the measures `value`; whether it moved by the tolerance."""
+    def _keep(self, value: float, plain: bool) -> bool:
+        """Take the state of the iteration, with the measures `value`; `plain` steps may become longer."""
         run = self._run
         self._memory.record(run.x - self.best)
         moved = float(np.abs(run.x - self.best).max())
@@ -177,6 +177,8 @@ class _Descent:
         if run.system is not self._system:  # other contacts: what was remembered is of other equations
             self._system = run.system
             self._memory.reset()
+        if plain:
+            self._share = min(1.0, REFINEMENT.longer * self._share)
         return moved >= self._tolerance
 
     def _measured(self) -> float:

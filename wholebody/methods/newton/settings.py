@@ -64,7 +64,8 @@ class Refinement(NamedTuple):
 
     rounds: int = 40  # most rounds
     motion: float = 1e-2  # weight of the motion. Smaller: faster, less stable for degrees of freedom without measures
-    shorter: float = 0.5  # factor on the length of a step after a round that was not kept
+    longer: float = 1.3  # factors on the length of a step after a round that was kept, and one that was not
+    shorter: float = 0.5
     shortest: float = 0.02  # least length; where shorter steps do not lower the measures, the last state is the minimum
     # of the tolerances, to which a round returns to the equations: larger errors would lower the measures
     finer: float = 0.1
