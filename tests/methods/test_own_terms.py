@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import minimize
 
 import wholebody as wb
+from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.figures.state import Wrench
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
@@ -192,9 +193,18 @@ def test_own_terms_of_joints_that_slide_are_kept(free_bodies: Callable[..., wb.F
     assert solution.assessment.constraint_violation < 1e-5
 
 
-def test_a_measure_of_the_roots_place_is_named(planar_arm: Callable[..., wb.Figure]) -> None:
-    human = wb.Scene(wb.load("human", detail="capsules"))
-    problem = wb.Problem(human, "standing", measures=[wb.tasks.PotentialEnergy()])
-    assert "PotentialEnergy is reported, not minimised" in wb.methods.Newton().solve(problem).message
+def test_a_goal_of_one_value_has_one_row(planar_arm: Callable[..., wb.Figure]) -> None:
     bodies = FigureBodies(wb.Scene(planar_arm((0.3, 0.2))).figure)
     assert goal_rows(bodies, Sum(0.0), "sum").size == 1
+
+
+@pytest.mark.parametrize("method", METHODS, ids=["qp", "newton"])
+def test_measures_of_joints_that_slide_are_minimised_too(method: Any) -> None:
+    """Of two equal convex terms with a given sum, each has half of it."""
+    builder = Builder("a slide and a hinge")
+    slide = builder.joint("px", "slide")
+    builder.rod(builder.joint("rz", "hinge", parent=slide, at=(0.3, 0.0, 0.0)), (0.3, 0.0, 0.0), 0.02)
+    problem = wb.Problem(wb.Scene(builder.figure()), np.zeros(2), goals=[Sum(1.2)], measures=[Bend()])
+    found = wb.solve(problem, method)
+    assert found.solved, found.message
+    np.testing.assert_allclose(found.q, 0.6, atol=1e-5)

@@ -46,7 +46,6 @@ class Ending(NamedTuple):
     unit: str = "iterations"  # name of what a method that did not converge ran out of
     failure: str = ""  # why the method could not continue, in words; "" if it could
     left_out: tuple[str, ...] = ()  # names of what the method does not look at, see `Descends.leaves_out`
-    remark: str = ""  # text at the end of every message
     # contradictions of the problem that the search found; None if it did not look for any
     contradictions: tuple[Contradiction, ...] | None = None
     judgement: Assessment | None = None  # the assessment of the posture, if the search has made it already
@@ -86,7 +85,7 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
     note = f"; {problem.left_out}" if problem.left_out else ""
     blocked = "" if status == "solved" else judgement.in_the_way
-    after = (blocked, _way_out(problem, judgement), ending.remark, _undefined(status, control), note)
+    after = (blocked, _way_out(problem, judgement), _undefined(status, control), note)
     return Solution(
         q=ending.q, status=status, seconds=control.seconds, iterations=ending.iterations, assessment=judgement,
         trace=ending.trace, method=ending.method or method, message=said + "".join(after),

@@ -12,8 +12,8 @@ import pytest
 
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit, with_world
+from wholebody.methods.newton.chart import DisplacementRows
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.measures import RootMotion
 
 K, N, H = 5, 6, 1e-6
 
@@ -47,15 +47,8 @@ MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
     "revolute": lambda g: Turn(_pairs(g), NAMES, _forms(g)[:, :2]),
     "fixed": lambda g: Turn(_pairs(g), NAMES, _forms(g)[:, :3]),
     "slide": lambda g: Slide(_pairs(g), NAMES, g.normal(size=(K, 2, 3)), g.normal(size=(K, 3)), g.normal(size=(K, 2))),
-    "root": lambda g: _root(g),
     "angle": lambda g: Angle(_pairs(g), NAMES, _forms(g)[:, 2:], np.zeros(K), np.zeros(K), np.sign(g.normal(size=K))),
 }
-
-
-def _root(g: np.random.Generator) -> RootMotion:
-    motion, turn = RootMotion(1, "the root"), g.normal(size=4)
-    motion.anchor(np.concatenate([g.normal(size=3), turn / np.linalg.norm(turn)]), g.normal(size=6))
-    return motion
 
 
 @pytest.mark.parametrize("name", MAKERS)
@@ -94,18 +87,6 @@ def test_an_angle_is_the_angle_of_the_joint() -> None:
     assert batch.angle(x) == pytest.approx(wanted, abs=1e-12)
 
 
-def test_the_motion_of_a_root_is_pinocchios_to_first_order() -> None:
-    model = pin.Model()
-    model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
-    rng = np.random.default_rng(3)
-    q = pin.integrate(model, pin.neutral(model), rng.normal(size=6))
-    motion, step = RootMotion(0, "the root"), 1e-6 * rng.normal(size=6)
-    motion.anchor(q, np.zeros(6))
-    assert motion.residual(q[None])[0] == pytest.approx(np.zeros(6), abs=1e-15)
-    after = pin.integrate(model, q, step)
-    np.testing.assert_allclose(motion.residual(after[None])[0], step, atol=1e-11)
-
-
 def test_degrees_of_freedom_of_every_kind_follow_their_bodies_as_pinocchio_differentiates_them() -> None:
     model, rng = pin.Model(), np.random.default_rng(5)
     kinds = (
@@ -120,7 +101,11 @@ def test_degrees_of_freedom_of_every_kind_follow_their_bodies_as_pinocchio_diffe
     bodies, q = FigureBodies(figure), pin.randomConfiguration(model)
     x, step = bodies.variables(q), 1e-6 * rng.normal(size=model.nv)
     moved = bodies.variables(pin.integrate(model, q, step)) - bodies.variables(pin.integrate(model, q, -step))
-    rows = bodies.tangent_rows(with_world(x))
+    here, chart = with_world(x), bodies.chart
+    rows = chart.rows(here)
     np.testing.assert_allclose(rows @ moved, 2.0 * step, atol=1e-11)
-    assert (rows[~bodies.chart] == 0.0).all()
-    assert bodies.chart[-2].sum() == 8  # a joint that turns reads no positions
+    assert (rows[~chart.pattern] == 0.0).all()
+    assert chart.pattern[-2].sum() == 8  # a joint that turns reads no positions
+    displaced = DisplacementRows(model, chart, lambda _: q)
+    displaced.anchor(pin.integrate(model, q, step), np.zeros(model.nv))
+    np.testing.assert_allclose(displaced.residual(here)[0], -step, atol=1e-11)

@@ -64,7 +64,7 @@ class Attraction:
     """
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
-        self._model, self._resolver, self._data = scene.model, resolver, scene.model.createData()
+        self._model, self._resolver = scene.model, resolver
         self.step_length, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
@@ -102,12 +102,11 @@ class Attraction:
         # A shoulder can move the arm back although the wrist cannot straighten. A part that gains nothing is settled.
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
-        turned = self._turned_back(q, trial)
         back = np.zeros(self._model.nv, dtype=bool)
         slow = []
         for k, (dofs, _) in enumerate(self.parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN and not self.free and not turned[k]:
+            if shares[k] and old - new < LEAST_GAIN and not self.free:
                 back[dofs] = True
             if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
                 slow.append(k)
@@ -122,20 +121,6 @@ class Attraction:
         if len(slow) or back.any():
             self._resolver.query(trial)
         return trial
-
-    def _turned_back(self, q: Array, trial: Array) -> list[bool]:
-        """Whether each part has a link, moved out by translation, that is nearer to its tracked direction than at q."""
-        found = [False] * len(self.parts)
-        for k, chain in enumerate(self._resolver.chains.values()):
-            tracked = self._resolver.tracked
-            if chain.translated and tracked is not None:
-                link, turns = max(chain.translated), []
-                for at in (q, trial):
-                    pin.forwardKinematics(self._model, self._data, at)
-                    wanted = tracked.placed[link].rotation
-                    turns.append(np.abs(self._data.oMi[link].rotation - wanted).max())
-                found[k] = turns[1] < turns[0] - 1e-3  # rad
-        return found
 
     def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
         """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""

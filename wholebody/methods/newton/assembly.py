@@ -26,15 +26,15 @@ from wholebody.methods.newton.assembly_system import (
     AssemblySystem,
     checked,
     explained,
-    objective_of,
     to_target,
 )
 from wholebody.methods.newton.assembly_system import Kind as GoalKind
 from wholebody.methods.newton.batches import Batch, EquationSet, Unit
+from wholebody.methods.newton.chart import Chart, DisplacementRows
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra import NAMES
-from wholebody.methods.newton.measures import refine
+from wholebody.methods.newton.measures import Objective, refine
 from wholebody.methods.newton.settings import CONTACTS, FRAMES
 from wholebody.methods.newton.system import System
 from wholebody.scene.moving_obstacles import FrameMotion
@@ -328,8 +328,11 @@ class Assembly(AssemblyJoints):
             figures = list(self._figures.values())
             self._analysed, objective = self.structures, None
             if self._measures:
-                loose = [self._names[name] for name in self._parts if name not in self._figures]
-                objective = objective_of(self._measures, self.scene, self.q, loose, figures)
+                scene = self.scene
+                rows = DisplacementRows(scene.model, Chart(scene.model), lambda x: self._to_scene(x[:-1].ravel()))
+                objective = Objective(
+                    scene.state(self.q), rows, [measure.resolve(scene, self.q) for measure in self._measures]
+                )
             found = AssemblySystem(
                 self._held(), self._weight(), name, figures, self._to_scene, self.revision, objective
             )

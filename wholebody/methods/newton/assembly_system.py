@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -17,7 +17,6 @@ from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, EquationSet, Role
 from wholebody.methods.newton.feasibility import FeasibilityResult
-from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.measures import Objective, refine
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, System, unit
@@ -204,21 +203,6 @@ class AssemblySystem(ActiveSystem):
         joints[1:, 3] = bodies[:, :3]
         for axis, unit_vector in enumerate(np.eye(3)):
             joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
-
-
-def objective_of(
-    measures: Iterable[Measure], scene: Scene, q: Array, bodies: Iterable[int], figures: Iterable[FigureBodies]
-) -> Objective:
-    """Rows of measures, resolved on an assembly's scene at its posture q (nq,); `bodies` are those without figure."""
-
-    def placed(body: int) -> tuple[int, int]:
-        joint = scene.model.joints[body + 1]
-        return int(joint.idx_q), int(joint.idx_v)
-
-    parts = [(figure, *placed(figure.first)) for figure in figures]
-    free = [(body, *placed(body)) for body in bodies]
-    free += [(figure.first + k, at + own_at, v + own_v) for figure, at, v in parts for k, own_at, own_v in figure.roots]
-    return Objective(scene.state(q), q, parts, free, [measure.resolve(scene, q) for measure in measures])
 
 
 def checked(measure: Measure, scene: Scene, q: Array) -> Measure:

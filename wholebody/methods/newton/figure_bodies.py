@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask, cross
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import quaternions
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import ONE_SIDED, Angle, EquationSet, with_world
+from wholebody.methods.newton.chart import Chart, DisplacementRows
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
 
@@ -32,6 +32,7 @@ class FigureBodies:
         q: (nq,) the posture at the last `retract`.
         step: a posture (nq,), and tangent displacements (nv,) from it within which later ones are kept, for velocity
             bounds of a frame; None for limits alone.
+        chart: the tangent displacement as a function of the bodies.
         data: Pinocchio's, with the placements of the joints at the last `variables` or `retract`.
     """
 
@@ -63,25 +64,17 @@ class FigureBodies:
         forms = relative_forms(*axes)[:, 2:]
         self.angles = Angle(turning, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))
         self._limited = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
-        self.limits = self._rows(self._limited, self.low[self._limited].copy())
+        self.limits = self._limit_rows()
         self.limits.role = ONE_SIDED
         self.weight = self._weight()
-        self._tangent: Indices = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
         self.step: tuple[Array, Array, Array] | None = None
         self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state_of: Array | None = None
-        self._rows_of: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
-        self._lay_chart()
+        self.chart = Chart(self.model, first)
 
     def index(self, joint: int) -> int:
         """Index of the body of one of Pinocchio's joints; -1, the world, for joint 0."""
         return self.first + joint - 1 if joint else -1
-
-    @property
-    def roots(self) -> tuple[tuple[int, int, int], ...]:
-        """Of each free root its body, and its first places in the posture and in the tangent."""
-        joints = [(joint, self.model.joints[joint]) for joint in self.figure.roots.values()]
-        return tuple((joint - 1, int(kind.idx_q), int(kind.idx_v)) for joint, kind in joints)
 
     @property
     def start_state(self) -> State:
@@ -105,66 +98,22 @@ class FigureBodies:
         self._state_of = None
         return self._present.update(q)
 
-    def tangent_rows(self, x: Array) -> Array:
-        """Derivative (nv, 7 count) of the tangent displacement by bodies x (count + 1, 7)."""
-        if self._rows_of[0] is not x:
-            self._rows_of = x, self._tangent_rows(x)
-        return self._rows_of[1]
-
-    def _tangent_rows(self, x: Array) -> Array:
-        """The velocity of each child relative to its parent, along the axes of the joint between them."""
-        (child, parent), (slides, turns) = self._ends, self._axes
-        first, second = x[child], x[parent]
-        along, about = (quat.rotate(first[:, 3:], axes) for axes in (slides, turns))  # in the world
-        lever = about + cross(first[:, :3] - second[:, :3], along)
-        spins = quat.spin(first[:, 3:]), quat.spin(second[:, 3:])
-        ours = np.hstack([along, np.einsum("ki,kij->kj", about, spins[0])])
-        theirs = -np.hstack([along, np.einsum("ki,kij->kj", lever, spins[1])])
-        result = np.zeros((self.model.nv, 7 * self.count))
-        result[self._entries] = np.hstack([ours, theirs])[self._reads]
-        return result
-
-    @property
-    def chart(self) -> Mask:
-        """(nv, 7 count) the variables of bodies that each degree of freedom is a function of."""
-        result: Mask = np.zeros((self.model.nv, 7 * self.count), dtype=bool)
-        result[self._entries] = True
-        return result
-
-    def _lay_chart(self) -> None:
-        """Find the bodies (2, nv) and the axes (2, nv, 3) of each degree of freedom, and what its row reads."""
-        model = self.model
-        self._ends: Indices = np.zeros((2, model.nv), dtype=np.intp)
-        self._axes = np.zeros((2, model.nv, 3))  # translation, rotation
-        for joint in range(1, model.njoints):
-            kind = model.joints[joint]
-            place = slice(kind.idx_v, kind.idx_v + kind.nv)
-            self._ends[0, place], self._ends[1, place] = self.index(joint), self.index(int(model.parents[joint]))
-            self._axes[:, place] = np.array(kind.createData().S).reshape(2, 3, -1).transpose(0, 2, 1)
-        columns = (7 * (self._ends.T[:, :, None] - self.first) + np.arange(7)).reshape(model.nv, 14)
-        sliding = self._axes[0].any(axis=1)[:, None]
-        self._reads: Mask = (columns >= 0) & (sliding | (np.arange(14) % 7 >= 3))  # nothing of the world
-        self._entries = np.nonzero(self._reads)[0], columns[self._reads]
-
-    def distance(self, q: Array) -> tuple[Angle, Indices]:
-        """One row for each revolute joint, its angle relative to q (nq,); and the joints' tangent indices."""
-        return self._rows(np.arange(len(self.angles)), self.angles_at(q).copy()), self._tangent
-
-    def angles_at(self, q: Array) -> Array:
-        """(k,) angles of the revolute joints at the posture q (nq,)."""
-        return q[self._places]
+    def displacement(self) -> DisplacementRows:
+        """One row for each degree of freedom: the figure's displacement from a posture."""
+        return DisplacementRows(self.model, self.chart, self._posture)
 
     def choose_limits(self) -> None:
         """Set the rows of `limits` to the limits that are nearer at the last posture."""
-        value = self.angles_at(self.q)[self._limited]
+        value = self.q[self._places][self._limited]
         low, high = self.low[self._limited], self.high[self._limited]
         upper = high - value < value - low
         self.limits.bound = np.where(upper, high, low)
         self.limits.sign = np.where(upper, -1.0, 1.0)
 
-    def _rows(self, chosen: Indices, bound: Array) -> Angle:
-        """One row for each of these revolute joints, its angle beyond a bound (k,) [rad]."""
-        part, labels = self.angles, [self.angles.labels[k] for k in chosen]
+    def _limit_rows(self) -> Angle:
+        """One row for each limited revolute joint, its angle beyond a bound."""
+        part, chosen = self.angles, self._limited
+        labels, bound = [part.labels[k] for k in chosen], self.low[chosen].copy()
         return Angle(part.bodies[chosen], labels, part.forms[chosen], part.center[chosen], bound, np.ones(len(chosen)))
 
     def retract(self, x: Array) -> None:

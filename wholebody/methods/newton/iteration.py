@@ -51,10 +51,6 @@ class _Trust:
             self.raise_damping()
         self.share, self.clamp = min(1.0, 2.0 * self.share), min(STEPS.error_clamp, 2.0 * self.clamp)
 
-    def narrow(self, least: float) -> None:
-        """After a step that only restores and does not reduce the goals' errors."""
-        self.funnel = max(STEPS.narrow * self.funnel, least)
-
 
 class Iteration:
     """State of one iteration."""
@@ -145,8 +141,6 @@ class Iteration:
             promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
             better = self._better(before, after, promised, 0.0 if restore else trust.funnel)
             if free and sum(after) < np.inf and (better or not self.state.finished()) and self.advance(trial, length):
-                if restore and after[1] >= before[1]:
-                    trust.narrow(self.tolerance)
                 progress = sum(after) < (1.0 - enough) * least or not self.state.finished()
                 least, stagnant = min(least, sum(after)), 0 if progress else stagnant + 1
                 trust.succeed(self._ratio(before[1], after[1], promised[1], restore))
@@ -228,7 +222,7 @@ class Iteration:
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
         diagonal = np.full(len(asked), STEPS.hard_damping + STEPS.hard_share * damping * damping)
-        softness = (STEPS.goal_damping if goal_share else STEPS.restoring_damping) + damping if goals else FREE
+        softness = STEPS.goal_damping + damping if goals else FREE
         diagonal[self.goal_rows] = softness / self.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
         if measures == "lower":

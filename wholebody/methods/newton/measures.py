@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import chain
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
-from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.acceleration import Anderson
-from wholebody.methods.newton.batches import OBJECTIVE, PLACE, TURN, Angle, Batch
+from wholebody.methods.newton.batches import OBJECTIVE, Batch
+from wholebody.methods.newton.chart import DisplacementRows
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
@@ -22,116 +20,51 @@ from wholebody.methods.newton.own_rows import TangentRows, quadratic_model, squa
 from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.problem import Problem
-from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
-from wholebody.tasks.checks import defined
-
-MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
-"""Measures that are minimised over the revolute joints, and over a root that they count."""
-
-
-class RootMotion(Batch):
-    """Displacement of a free root from a posture, in its own axes there, less a target; linear in the body.
-
-    Three rows are R_a' (r - r_a), three are 2 vec(conj(e_a) e). At r = r_a and e = e_a their derivative is that of
-    Pinocchio's tangent displacement.
-    """
-
-    size = 6
-    pattern = np.zeros((6, 7), dtype=bool)
-    pattern[:3, PLACE] = pattern[3:, TURN] = True
-
-    def __init__(self, body: int, label: str) -> None:
-        """Take the number of the root's body; `anchor` says from where it moves."""
-        super().__init__(np.array([[body]]), [label])
-        self._place, self._target, self._slope = np.zeros(3), np.zeros(6), np.zeros((6, 7))
-
-    def anchor(self, root: Array, target: Array) -> None:
-        """Count from the root's placement (7,), position and quaternion x, y, z, w, towards a displacement (6,)."""
-        a, b, c, w = root[3:].tolist()
-        self._place, self._target = root[:3].copy(), target
-        self._slope[:3, PLACE] = pin.Quaternion(root[3:]).toRotationMatrix().T
-        self._slope[3:, TURN] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
-
-    def residual(self, x: Array) -> Array:  # noqa: D102
-        body = x[self.bodies[0, 0]]
-        turned = self._slope[3:, TURN] @ body[TURN]
-        moved = self._slope[:3, PLACE] @ (body[PLACE] - self._place)
-        result: Array = np.concatenate([moved, turned])[None] - self._target
-        return result
-
-    def jacobian(self, x: Array) -> Array:  # noqa: D102
-        result: Array = self._slope[None].copy()
-        return result
 
 
 class Objective:
-    """Rows whose squares model measures: one for each revolute joint, and six for each root or body that counts."""
+    """Rows whose squares model measures: one for each degree of freedom, and those of measures that are squares."""
 
-    def __init__(
-        self,
-        state: State,
-        q: Array,
-        figures: Iterable[tuple[FigureBodies, int, int]],
-        free: Sequence[tuple[int, int, int]],
-        measures: Iterable[Measure] = (),
-    ) -> None:
-        """Take resolved measures; figures and free bodies come with their first places in q (nq,) and the tangent."""
-        self._state, self.minimised = state, list(measures)
-        self._curved = self.minimised  # those that have no rows of their own
+    def __init__(self, state: State, rows: DisplacementRows, measures: Iterable[Measure]) -> None:
+        """Take resolved measures, and a state that may be moved."""
+        self._state, self._rows, self.measures = state, rows, list(measures)
+        self._curved = self.measures  # those that have no rows of their own
         self.squares: list[TangentRows] = []
-        self._angles: list[tuple[FigureBodies, slice, Angle, Indices]] = []
-        for bodies, at, v in figures:
-            part = slice(at, at + bodies.model.nq)
-            rows, tangent = bodies.distance(q[part])
-            self._angles.append((bodies, part, rows, v + tangent))
-        self._free = [(RootMotion(body, "the measures"), at, v) for body, at, v in free]
-        self._tangent = np.concatenate([*(each[3] for each in self._angles), *(np.arange(v, v + 6) for *_, v in free)])
-        self.stiffness = np.full(len(self._tangent), REFINEMENT.stiffness * REFINEMENT.least_stiffness)
+        self.stiffness = np.full(rows.size, REFINEMENT.stiffness * REFINEMENT.least_stiffness)
 
     def batches(self) -> list[Batch]:
         """All rows, in the order of their factors."""
-        found: list[Batch] = [*(rows for _, _, rows, _ in self._angles), *(motion for motion, _, _ in self._free)]
-        for batch in (*found, *self.squares):
+        for batch in self.squares:
             batch.role = OBJECTIVE
-        return [*found, *self.squares]
+        return [self._rows, *self.squares]
 
     def value(self, q: Array) -> float:
-        """The minimised measures, with their weights, at the posture q (nq,)."""
+        """The measures, with their weights, at the posture q (nq,)."""
         state = self._state.update(q)
-        return float(sum(term.weight * term.value(state) for term in self.minimised))
+        return float(sum(term.weight * term.value(state) for term in self.measures))
 
     def renew(self, q: Array) -> None:
         """Model the measures at the posture q (nq,)."""
-        state = self._state.update(q)
-        gradient, curvature = quadratic_model(self._curved, state)
+        gradient, curvature = quadratic_model(self._curved, self._state.update(q))
         half = np.maximum(0.5 * curvature, REFINEMENT.least_stiffness)
-        self._aim(q, -0.5 * gradient / half)
-        self.stiffness = REFINEMENT.stiffness * half[self._tangent]
+        self._rows.anchor(q, -0.5 * gradient / half)
+        self.stiffness = REFINEMENT.stiffness * half
 
     @property
     def factors(self) -> Array:
         """(rows,) the present factors on the squares of all rows."""
         return np.append(self.stiffness, np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness))
 
-    def _aim(self, q: Array, way: Array) -> None:
-        """Count from the posture q (nq,), towards displacements (nv,)."""
-        for bodies, part, rows, tangent in self._angles:
-            rows.bound = bodies.angles_at(q[part]) + way[tangent]
-        for motion, at, v in self._free:
-            motion.anchor(q[at : at + 7], way[v : v + 6])
-
 
 class FigureObjective(Objective):
-    """The rows of a problem: measures that are minimised, among them sums of squares; `reported` names the others."""
+    """The rows of a problem's measures, among them sums of squares."""
 
     def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
-        counted = [root for root in bodies.roots if _counts_root(problem, state, root[2])]
-        super().__init__(state, problem.start, [(bodies, 0, 0)], counted)
-        self._curved, self.reported, self._follows = list[Measure](), list[str](), True
-        self.minimised, others = split_measures(problem, state)
-        self.reported += [type(term).__name__ for term in others]
-        for term in self.minimised:
+        """Take the figure's bodies, and a state that may be moved."""
+        super().__init__(state, bodies.displacement(), problem.measures)
+        self._curved, self._follows = list[Measure](), True
+        for term in self.measures:
             rows = square_rows(bodies, term, type(term).__name__)
             self._curved += [term] if rows is None else []
             self.squares += [] if rows is None else [rows]
@@ -139,7 +72,7 @@ class FigureObjective(Objective):
     def anchor(self, q: Array) -> None:
         """Use displacements from q (nq,), the last state of a drag, with the measures' second derivatives."""
         super().renew(q)
-        self._aim(q, np.zeros(len(q)))
+        self._rows.anchor(q, np.zeros(self._rows.size))
         for rows in self.squares:
             rows.count_from(q)
         self._follows = False
@@ -154,40 +87,6 @@ class FigureObjective(Objective):
         """Model the measures at the posture q (nq,), unless an anchor is set."""
         if self._follows:
             super().renew(q)
-
-
-def _counts_root(problem: Problem, state: State, first: int) -> bool:
-    """Whether the measures that are always minimised count the motion of the free root with these freedoms."""
-    curved = [
-        term.weight * term.curvature(state.update(problem.start))
-        for term in problem.measures
-        if type(term) in MINIMISED
-    ]
-    return bool(curved) and float(np.min(np.sum(curved, axis=0)[first : first + 6])) > 0.0
-
-
-def split_measures(problem: Problem, state: State) -> tuple[list[Measure], list[Measure]]:
-    """The measures that are minimised, and those that are only reported; the state is moved."""
-    # in a tenth of the time of the equations, which every solve would build twice
-    model, roots = problem.scene.model, problem.scene.figure.roots.values()
-    free = [int(model.joints[joint].idx_v) for joint in roots]
-    counted = [range(first, first + 6) for first in free if _counts_root(problem, state, first)]
-    plain = [kind for kind in list(model.joints)[1:] if kind.nq == kind.nv == 1]  # the first is the world
-    turning = [kind.idx_v for kind in plain if kind.shortname().startswith("JointModelR")]
-    tangent = np.array([*turning, *chain.from_iterable(counted)], dtype=np.intp)
-    found: tuple[list[Measure], list[Measure]] = [], []
-    for term in problem.measures:
-        found[not (isinstance(term, MINIMISED) or _depends_on(term, tangent, problem.start, state))].append(term)
-    return found
-
-
-def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) -> bool:
-    """Whether a measure depends on these degrees of freedom alone, at the start and some other postures."""
-    others = np.ones(state.model.nv, dtype=bool)
-    others[tangent] = False
-    postures = [start, *random_postures(state.model, 3, seed=1)] if others.any() else []
-    states = defined(measure, (state.update(q) for q in postures))
-    return not any(np.abs(measure.gradient(at)[others]).max() > 0.0 for at in states)
 
 
 class Refined(NamedTuple):

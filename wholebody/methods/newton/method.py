@@ -18,7 +18,6 @@ from wholebody.methods.base import TOLERANCE, FrameStep, SolvingTracker
 from wholebody.methods.conclusion import Descends, Ending, concluded
 from wholebody.methods.control import BUDGET, Control
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
-from wholebody.methods.newton.measures import MINIMISED, split_measures
 from wholebody.methods.newton.multistart import NewtonMultistart, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.methods.newton.terms import FigureSystem, state_equations
@@ -33,10 +32,9 @@ class Newton(Settings, Descends):
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
     Every body has seven variables, every joint is an equation, and each step is the least motion that satisfies all of
-    them. The iteration minimises measures of the revolute joints, your own included, to the accuracy of its
-    termination. A measure that depends on the root's position or on other joints is only reported, and the message
-    names it. Goals and constraints of your own are taken. If the goals cannot be met, the method minimises their
-    squares subject to the constraints.
+    them. The iteration minimises measures, your own included, to the accuracy of its termination. Goals and
+    constraints of your own are taken. If the goals cannot be met, the method minimises their squares subject to the
+    constraints.
 
     The object has only settings and serves any number of problems and threads at the same time.
 
@@ -68,13 +66,6 @@ class Newton(Settings, Descends):
     def _check_terms(self, problem: Problem) -> None:
         with problem.borrow() as workspace:
             state_equations(problem, workspace.state)
-
-    def _unseen(self, problem: Problem) -> tuple[str, ...]:
-        """See `Descends._unseen`: stated measures that depend on what is no revolute joint."""
-        if not problem.measures_given or all(isinstance(term, MINIMISED) for term in problem.measures):
-            return ()
-        with problem.borrow() as workspace:
-            return tuple(type(term).__name__ for term in split_measures(problem, workspace.state)[1])
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""

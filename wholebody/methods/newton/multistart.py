@@ -23,7 +23,7 @@ from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem
 from wholebody.methods.simplification import beyond_reach
-from wholebody.methods.starts import Attempt, Minima, Multistart, off_limits, restarts
+from wholebody.methods.starts import Attempt, Multistart, off_limits, restarts
 from wholebody.solution import TraceEntry
 from wholebody.tasks.frame import Frame
 from wholebody.tasks.point import Point
@@ -68,7 +68,6 @@ class NewtonMultistart(Multistart[SearchResult]):
         self.active_system, self.settings = active_system, settings
         self.iterations, self._most = 0, np.inf  # after which no other start follows
         self.residuals: list[float] = []
-        self._minima = Minima()
 
     def from_here(self, q: Array) -> Ending:
         """The end of the search from a posture (nq,) alone."""
@@ -83,7 +82,7 @@ class NewtonMultistart(Multistart[SearchResult]):
         if not self.control.over:
             if not self.best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
                 self.accept(self._least_violation(q))
-            if self.solves(self.best) and self.active_system.objective.minimised:
+            if self.solves(self.best) and self.active_system.objective.measures:
                 self._refine()
         if self.solves(self.best):
             self.contradictions = ()  # by less than the tolerance
@@ -109,8 +108,6 @@ class NewtonMultistart(Multistart[SearchResult]):
         found = self._go(start, min(STARTS.trial, self.settings.iterations))
         if self.better(found, self.best) and not found.reached.stationary and not self.solves(found):
             found = self._go(found.q, self.settings.iterations)
-        least = max(_broken(found), self.settings.assessed_tolerance) + _missed(found)
-        self._minima.add(least, found.reached.stationary)
         return found
 
     def _beyond_reach(self) -> bool:
@@ -129,14 +126,13 @@ class NewtonMultistart(Multistart[SearchResult]):
 
     def _ending(self) -> Ending:
         """The best result as the end of the search."""
-        found, reported = self.best, ", ".join(self.active_system.objective.reported)
+        found = self.best
         return Ending(
             found.q,
             found.reached.stationary,
             self.iterations,
             tuple(TraceEntry(error, 0.0, 0.0, 0.0) for error in self.residuals),
             f"in {self.iterations} iterations{self.how}",
-            remark=f"; {reported} is reported, not minimised" if reported else "",
             contradictions=self.contradictions,
             judgement=found.judgement,
             method=f"newton/{self.active_system.algebra.name}",
@@ -183,8 +179,8 @@ class NewtonMultistart(Multistart[SearchResult]):
         return meets(end.judgement, self.settings.tolerance)
 
     def enough(self) -> bool:
-        """Whether all minima are found, or the iterations or the time for other starts are spent."""
-        return self._minima.complete or self.iterations > self._most or self.control.spent > STARTS.time_share
+        """Whether the iterations or the time for other starts are spent."""
+        return self.iterations > self._most or self.control.spent > STARTS.time_share
 
     def better(self, one: SearchResult, other: SearchResult) -> bool:
         """Whether one result is better: in the violation, then in the goal errors, then in the measures."""

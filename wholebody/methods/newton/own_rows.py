@@ -37,7 +37,7 @@ class TangentRows(Batch):
         self.size = len(chosen)
         if depends is None:
             depends = np.ones((self.size, bodies.model.nv), dtype=bool)
-        self.pattern = depends @ bodies.chart
+        self.pattern = depends @ bodies.chart.pattern
 
     def count_from(self, q: Array | None) -> None:
         """Count the values from those at the posture q (nq,), or from zero."""
@@ -50,7 +50,7 @@ class TangentRows(Batch):
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         rows = self._slope(self._figure.state_at(x))[self.chosen]
-        result: Array = (self.sign[:, None] * (rows @ self._figure.tangent_rows(x)))[None]
+        result: Array = (self.sign[:, None] * (rows @ self._figure.chart.rows(x)))[None]
         return result
 
 

@@ -15,7 +15,6 @@ class Steps(NamedTuple):
     damping_up: float = 8.0  # factors after a failed step, and after a good one
     damping_down: float = 0.1
     hard_share: float = 1e-6  # of the squared damping applies to constraints, for conflicts among them
-    restoring_damping: float = 0.03  # of goals in a step that only restores: they keep their errors, but may give way
     # m or rad: largest reduction of a goal's error in a step. Larger: fewer steps, more of them fail
     error_clamp: float = 0.3
     # change of Euler parameters in a step, half the radians. Larger: beyond what a linearisation says
@@ -27,7 +26,6 @@ class Steps(NamedTuple):
     # m or rad of violation allowed for a metre of goal, and at most; beyond it a step only restores. Larger: longer
     # steps; at metres, goals far out of reach pull chains open so far that they do not close again
     funnel: float = 0.5
-    narrow: float = 0.7  # factor on the funnel after a step that only restores
     gain: float = 0.05  # least ratio of actual to predicted reduction of a step
     restored: float = 0.2  # the same for a step that only restores the constraints
     least_progress: float = 1e-6  # relative reduction below which a step counts as no progress
