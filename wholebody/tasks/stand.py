@@ -25,7 +25,7 @@ from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, bearing_face
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_beyond, segments_on, surface
 
-STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
+STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/m^2, but 1/rad^2 of the angle: ESTIMATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,25 +163,31 @@ class Stance(SumOfSquares):
     weight: inputs.Weight = 1.0
     places: tuple[inputs.Place, inputs.Place] = field(init=False, repr=False)
     rest: Array = field(init=False, repr=False)
+    mass: range | None = field(init=False, repr=False)
 
     def resolve(self, scene: Scene, start: Array) -> Stance:
         """Find the feet, and how they are in the first posture."""
         if len(self.feet) != 2:
             raise InputError(f"Stance: feet has {len(self.feet)} names; give two")
         places = tuple(inputs.find_place(scene, foot, "Stance") for foot in self.feet)
-        found = filled(self, places=places, rest=np.zeros(3))
+        mass = inputs.joints_with_mass(scene, "Stance", self.feet)
+        found = filled(self, places=places, rest=np.zeros(5), mass=mass)
         with scene.figure.posed(scene.figure.neutral) as upright:
             rest = found.squares(upright)[0] / np.sqrt(STANCE_WEIGHTS)
-        return filled(found, rest=rest + (0.001, 0.0, 0.0))  # m: of a split stance and its mirror image one is lower
+        return filled(found, rest=rest + (0.001, 0.0, 0.0, 0.0, 0.0))  # m: of a split stance and its mirror image one is lower
 
     def squares(self, state: State) -> tuple[Array, Array]:
-        """Residuals (3,) and their derivatives (3, nv)."""
+        """Residuals (5,) and their derivatives (5, nv)."""
         (one, other), joints = (state.frame(place.frame) for place in self.places), [p.joint for p in self.places]
-        values, rows = np.zeros(3), np.zeros((3, state.model.nv))
+        values, rows = np.zeros(5), np.zeros((5, state.model.nv))
+        center, moves = state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass)
         for a, b, sign, (joint, against) in ((one, other, 0.5, joints[::-1]), (other, one, -0.5, joints)):
             axes = sign * a.rotation[:, :2].T
             values[:2] += axes @ (b.translation - a.translation)
             rows[:2] += between(state, through(b.translation, axes), joint, against)
+            sees = 0.5 * a.rotation[:, :2].T
+            values[3:] += sees @ (center - a.translation)
+            rows[3:] += sees @ moves - between(state, through(center, sees), against, 0)
         left, ahead = one.rotation[:, 1], other.rotation[:, 0]
         values[2] = left @ ahead
         rows[2] = between(state, np.append(np.zeros(3), cross(ahead, left))[None], joints[1], joints[0])[0]
