@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence, Set
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,6 +32,7 @@ UPRIGHT: tuple[type[Balance | LoadedBalance | Stand], ...] = (Balance, LoadedBal
 """Terms that say how somebody stands."""
 
 _effort, _rhythm = Effort(), Rhythm()
+_Kept = TypeVar("_Kept", Stance, Hang)
 
 
 def usual_measures(
@@ -54,7 +56,7 @@ def usual_measures(
 def default_measures(
     scene: Scene,
     start: Array,
-    stances: Sequence[tuple[str, ...]],
+    stances: Sequence[tuple[tuple[str, ...], bool]],
     seats: Mapping[str, tuple[str, str]],
     hanging: tuple[str, ...],
     *,
@@ -62,28 +64,29 @@ def default_measures(
 ) -> tuple[Measure, ...]:
     """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture.
 
-    `hanging` are arms that hang, see `free_arms`. `seats` are what persons sit on, see `seated`. The shares of knees and
+    `hanging` are arms that hang, see `free_arms`, `seats` what persons sit on, see `seated`. The shares of knees and
     lumbar spine are those of somebody who bends down on both feet: on a seat the knees follow the pedals, and who leans
     back bends no lordosis. How far the seat is from the start is no effort of theirs either.
     """
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
-    shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
+    shanks = {side for sides, _ in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
-    pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
+    pairs = [(feet, both) for feet, both in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
     effort, rhythm = _effort.resolve(scene, rest), _rhythm.resolve(scene, rest)
     if seats:
         who = tuple(seats)
         effort = without_freedoms(effort, _ways(scene, who))
         rhythm = rhythm.of_arms(inputs.once(scene, ("places", who), partial(_places, scene, who)))
 
-    def kept(kind: type[Stance | Hang], names: tuple[str, ...]) -> Measure:  # whatever the start is, it is the same
+    def kept(kind: type[_Kept], names: tuple[str, ...]) -> _Kept:  # whatever the start is, it is the same
         return inputs.once(scene, (kind, names), lambda: kind(names).resolve(scene, rest))
 
     free = [kept(Hang, hanging)] if hanging else []
+    feet = (kept(Stance, pair) if both else kept(Stance, pair).of_feet() for pair, both in pairs)
     alone = [(on, pelvis) for on, pelvis in seats.values() if sum(on == other for other, _ in seats.values()) == 1]
     middles = (SeatCenterline(on, pelvis=pelvis).resolve(scene, start) for on, pelvis in alone)
-    return (effort, rhythm, *(kept(Stance, pair) for pair in pairs), *middles, *free)
+    return (effort, rhythm, *feet, *middles, *free)
 
 
 def _places(scene: Scene, bodies: Sequence[str]) -> frozenset[int]:
@@ -163,8 +166,8 @@ def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
     )
 
 
-def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on.
+def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[tuple[str, ...], bool], ...]:
+    """The feet of each person that stands and balances, or kneels, and whether one `Stand` has them all.
 
     Those of somebody with one foot on one thing and one on another are together, as both belong to a stance.
     """
@@ -182,7 +185,8 @@ def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> t
     found = [tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one))]
     single = {one.feet[0]: inputs.body_of(scene, one.feet) for one in stand if len(one.feet) == 1 and not one.knees}
     pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet in found]
-    return tuple(dict.fromkeys(pair if len(pair) == 2 else feet for feet, pair in zip(found, pairs, strict=True)))
+    both = [(pair, False) if len(pair) == 2 else (feet, True) for feet, pair in zip(found, pairs, strict=True)]
+    return tuple(dict.fromkeys(both))
 
 
 def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:
