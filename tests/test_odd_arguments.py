@@ -385,6 +385,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Sit(back)", Call(lambda back: wb.Sit("crate", back), {"back": "post"}, on_a_person)
     yield "Hang", Call(wb.tasks.Hang, {"arms": ["left_upper_arm"], "weight": 1.0}, on_a_person)
     yield "Stance", Call(wb.tasks.Stance, {"feet": ["left_foot", "right_foot"], "weight": 1.0}, on_a_person)
+    middle = {"on": "crate", "pelvis": "pelvis", "weight": 1.0}
+    yield "SeatCenterline", Call(wb.tasks.SeatCenterline, middle, on_a_person)
+    yield "Stance.of_feet", Call(wb.tasks.Stance().resolve(person, person.figure.neutral).of_feet, {})
     yield "Stand", Call(wb.Stand, {"on": "crate", "feet": ["left_foot"], "balance": True, "margin": 0.0}, on_a_person)
     grasp = {"hand": "left", "thing": "crate", "kind": "palm", "side": at, "weight": 1.0}
     yield "Grasp", Call(wb.Grasp, grasp, on_a_person)

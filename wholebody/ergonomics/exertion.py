@@ -28,7 +28,7 @@ LEVER = 0.06
 """m: of the muscles of the back about the disc L5/S1. One muscle stands for all: 50 to 75 mm in the literature
 (Chaffin, Andersson & Martin, "Occupational Biomechanics", chapter 6)."""
 
-ROUND = 5.0  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
+ROUND = 0.1  # N m: smaller moments than this of either side count as none, so that the derivative is continuous
 FEET = ("left_sole", "right_sole")
 MOST = 3400.0  # N: compression that NIOSH's action limit allows (1981)
 

@@ -174,7 +174,7 @@ CONSTRAINTS = {
 
 MEASURES = {
     **_forms(tasks.Effort, tasks.RotationEffort, tasks.Discomfort, tasks.Displacement, tasks.Rhythm, tasks.Hang),
-    **_forms(tasks.Stance, tasks.PotentialEnergy),
+    **_forms(tasks.Stance, tasks.SeatCenterline, tasks.PotentialEnergy),
     **_forms(ergonomics.Exertion, forces=FORCES, strength=STRENGTH),
 }
 

@@ -22,6 +22,6 @@ from wholebody.tasks.point import CenterOfMass as CenterOfMass, Plane as Plane, 
 from wholebody.tasks.posture import Posture as Posture
 from wholebody.tasks.range_of_motion import RangeOfMotion as RangeOfMotion, ReachCones as ReachCones
 from wholebody.tasks.rhythm import Rhythm as Rhythm
-from wholebody.tasks.sit import Sit as Sit
+from wholebody.tasks.sit import SeatCenterline as SeatCenterline, Sit as Sit
 from wholebody.tasks.stand import Hang as Hang, Stance as Stance, Stand as Stand
 from wholebody.tasks.touch import Lean as Lean, Touch as Touch

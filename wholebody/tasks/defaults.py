@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence, Set
+from collections.abc import Hashable, Mapping, Sequence, Set
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from wholebody.tasks.frame import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.rhythm import Rhythm, girdles_of
-from wholebody.tasks.sit import Sit
+from wholebody.tasks.sit import SeatCenterline, Sit
 from wholebody.tasks.stand import Hang, Stance, Stand
 from wholebody.tasks.touch import Lean
 
@@ -31,6 +32,7 @@ UPRIGHT: tuple[type[Balance | LoadedBalance | Stand], ...] = (Balance, LoadedBal
 """Terms that say how somebody stands."""
 
 _effort, _rhythm = Effort(), Rhythm()
+_Kept = TypeVar("_Kept", Stance, Hang)
 
 
 def usual_measures(
@@ -40,46 +42,51 @@ def usual_measures(
     """The measures of a problem that states none, for its resolved terms and persons of `standing`; once a scene."""
     if not scene.figure.ranges:  # no person; to look it up by its start takes longer
         return (_effort.resolve(scene, start),)
-    feet, sits = stances(scene, start, terms), seated(scene, terms)
+    feet, seats = stances(scene, start, terms), seated(scene, terms)
     arms: tuple[str, ...] = ()
     if ranges:
         stated = [inputs.body_of(scene, term.feet) for term in terms if is_a(term, UPRIGHT)]
-        arms = free_arms(scene, start, terms, bounds, {*stated, *stands} - {None, *sits})
-    make = partial(default_measures, scene, start, feet, sits, arms, ranges=ranges)
-    found: tuple[Measure, ...] = scene.built.known(("measures", ranges, feet, sits, arms, start.tobytes()), make)
+        arms = free_arms(scene, start, terms, bounds, {*stated, *stands} - {None, *seats})
+    make = partial(default_measures, scene, start, feet, seats, arms, ranges=ranges)
+    key = "measures", ranges, feet, (*seats.items(),), arms, start.tobytes()
+    found: tuple[Measure, ...] = scene.built.known(key, make)
     return found
 
 
 def default_measures(
     scene: Scene,
     start: Array,
-    stances: Sequence[tuple[str, ...]],
-    seated: Sequence[str],
+    stances: Sequence[tuple[tuple[str, ...], bool]],
+    seats: Mapping[str, tuple[str, str]],
     hanging: tuple[str, ...],
     *,
     ranges: bool,
 ) -> tuple[Measure, ...]:
     """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture.
 
-    `hanging` are arms that hang, see `free_arms`. `seated` are the persons who sit, by what their names begin with. The
-    shares of knees and lumbar spine are those of somebody who bends down on both feet: on a seat the knees follow the
-    pedals, and who leans back bends no lordosis. How far the seat is from the start is no effort of theirs either.
+    `hanging` are arms that hang, see `free_arms`, `seats` what persons sit on, see `seated`. The shares of knees and
+    lumbar spine are those of somebody who bends down on both feet: on a seat the knees follow the pedals, and who leans
+    back bends no lordosis. How far the seat is from the start is no effort of theirs either.
     """
     if not (ranges and scene.figure.ranges and inputs.once(scene, "girdles", lambda: girdles_of(scene.figure))):
         return (_effort.resolve(scene, start),)
-    shanks = {side for sides in stances for side in sides if side.endswith("_shank")}
+    shanks = {side for sides, _ in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
-    pairs = [feet for feet in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
+    pairs = [(feet, both) for feet, both in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
     effort, rhythm = _effort.resolve(scene, rest), _rhythm.resolve(scene, rest)
-    if seated:
-        effort = without_freedoms(effort, _ways(scene, seated))
-        rhythm = rhythm.of_arms(inputs.once(scene, ("places", seated), partial(_places, scene, seated)))
+    if seats:
+        who = tuple(seats)
+        effort = without_freedoms(effort, _ways(scene, who))
+        rhythm = rhythm.of_arms(inputs.once(scene, ("places", who), partial(_places, scene, who)))
 
-    def kept(kind: type[Stance | Hang], names: tuple[str, ...]) -> Measure:  # whatever the start is, it is the same
+    def kept(kind: type[_Kept], names: tuple[str, ...]) -> _Kept:  # whatever the start is, it is the same
         return inputs.once(scene, (kind, names), lambda: kind(names).resolve(scene, rest))
 
     free = [kept(Hang, hanging)] if hanging else []
-    return (effort, rhythm, *(kept(Stance, pair) for pair in pairs), *free)
+    feet = (kept(Stance, pair) if both else kept(Stance, pair).of_feet() for pair, both in pairs)
+    alone = [(on, pelvis) for on, pelvis in seats.values() if sum(on == other for other, _ in seats.values()) == 1]
+    middles = (SeatCenterline(on, pelvis=pelvis).resolve(scene, start) for on, pelvis in alone)
+    return (effort, rhythm, *feet, *middles, *free)
 
 
 def _places(scene: Scene, bodies: Sequence[str]) -> frozenset[int]:
@@ -94,10 +101,10 @@ def _ways(scene: Scene, bodies: Sequence[str]) -> list[int]:
     return [first + axis for first in firsts for axis in range(3)]
 
 
-def seated(scene: Scene, terms: Sequence[Constraint | Goal]) -> tuple[str, ...]:
-    """The persons who sit on something, by what their names begin with."""
-    return tuple(body for term in terms if is_a(term, (Sit,))
-                 if (body := inputs.body_of(scene, [term.frame])) is not None)  # fmt: skip
+def seated(scene: Scene, terms: Sequence[Constraint | Goal]) -> dict[str, tuple[str, str]]:
+    """The seat and the pelvis of the persons who sit on something, by what their names begin with."""
+    return {body: (term.on, term.pelvis) for term in terms if is_a(term, (Sit,))
+            if (body := inputs.body_of(scene, [term.frame])) is not None}  # fmt: skip
 
 
 def free_arms(
@@ -159,8 +166,8 @@ def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
     )
 
 
-def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[str, ...], ...]:
-    """The feet of each person that stands and balances, or kneels, but does not sit, lean or hold on.
+def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[tuple[str, ...], bool], ...]:
+    """The feet of each person that stands and balances, or kneels, and whether one `Stand` has them all.
 
     Those of somebody with one foot on one thing and one on another are together, as both belong to a stance.
     """
@@ -178,7 +185,8 @@ def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> t
     found = [tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one))]
     single = {one.feet[0]: inputs.body_of(scene, one.feet) for one in stand if len(one.feet) == 1 and not one.knees}
     pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet in found]
-    return tuple(dict.fromkeys(pair if len(pair) == 2 else feet for feet, pair in zip(found, pairs, strict=True)))
+    both = [(pair, False) if len(pair) == 2 else (feet, True) for feet, pair in zip(found, pairs, strict=True)]
+    return tuple(dict.fromkeys(both))
 
 
 def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -17,7 +17,20 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Made, Near, Over, Part, owner_pairs
+from wholebody.tasks.contact_parts import (
+    ContactTerm,
+    Facing,
+    Gap,
+    Level,
+    Made,
+    Near,
+    Over,
+    Part,
+    between,
+    owner_pairs,
+    through,
+)
+from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, Face, back_above, face
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_on, surface
 
@@ -81,16 +94,15 @@ class Sit(ContactTerm):
         # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
         deep = _depth(scene, self.pelvis, place, rest) + 0.01
         over = Over(place, seat, np.append(-edge, 0.0), np.append(edge, deep))  # 0: not below the seat
-        root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
-        left = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 1]
+        left = _way(scene, place, rest, 1)
         parts: list[Part] = [Gap(bottom, seat.surface, seat), over]
         behind = [self.pelvis] if self.erect else []  # whoever sits erect has the buttocks at the back, too
         touches = owner_pairs(bottom.owners, seat.surface.owners)
         if self.back is None:
             parts.append(Level(place, left, seat))
         else:
-            between = (joint for joint in scene.model.supports[trunk.joint] if joint > place.joint)
-            upper = joined(scene, self.trunk, [*behind, *segments_on(scene, between)])
+            spine = (joint for joint in scene.model.supports[trunk.joint] if joint > place.joint)
+            upper = joined(scene, self.trunk, [*behind, *segments_on(scene, spine)])
             side, at_back = self._at_back(scene, self.back, seat, state, where)
             to_left = _level(cross(UP, side.at(state)[1][2]), where)
             lower = joined(scene, self.pelvis, [self.pelvis])
@@ -99,8 +111,7 @@ class Sit(ContactTerm):
             parts += [Facing(place, across(left), side, side.at(state)[1] @ to_left)]
             touches += owner_pairs([*upper.owners, *lower.owners], at_back.owners)
         if self.erect:
-            ahead = rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, 0]
-            parts += [Level(place, ahead, seat), self._measured(scene, place, where)]
+            parts += [Level(place, _way(scene, place, rest, 0), seat), self._measured(scene, place, where)]
         return tuple(parts), touches
 
     def _at_back(self, scene: Scene, back: str, seat: Face, state: State, where: str) -> tuple[Face, Surface]:
@@ -126,6 +137,57 @@ class Sit(ContactTerm):
         return AtAngles(idx_q, idx_v, figure.with_joints(figure.posture(posture), parallel)[idx_q])
 
 
+@dataclass(frozen=True, eq=False)
+class SeatCenterline(SumOfSquares):
+    """Squared distance of the pelvis to the side of a seat's middle, over half of the seat's longer side.
+
+    So it counts on a chair and hardly on a bench, and not on what has no end. A person who sits by `Sit` has this
+    measure by default: else nothing says where on the seat, and of a task that is the same on the left and on the right
+    the answer is beside the middle, on one side or on the other.
+
+    Attributes:
+        on: the seat.
+        pelvis: the segment that sits.
+        weight: factor on the measure.
+        place: of the pelvis, once resolved.
+        face: of the seat.
+        left: (3,) to the left of who sits, in the axes of the pelvis.
+
+    Raises:
+        InputError: a value of the wrong kind, shape or range.
+        UnknownNameError: in a problem, a name that the scene does not have.
+
+    Examples:
+        >>> in_the_middle = wb.tasks.SeatCenterline("seat")
+    """
+
+    on: inputs.Name
+    _: KW_ONLY
+    pelvis: inputs.Name = "pelvis"
+    weight: inputs.Weight = 20.0  # beside an effort of 20 for the clavicles, which turn where the middle is left
+    place: inputs.Place = field(init=False, repr=False)
+    face: Face = field(init=False, repr=False)
+    left: Array = field(init=False, repr=False)
+
+    def resolve(self, scene: Scene, start: Array) -> SeatCenterline:
+        """Find the pelvis and the seat's face."""
+        where = f"SeatCenterline({shown(self.on)})"
+        place, key = inputs.find_place(scene, self.pelvis, where), (type(self), self.on, self.pelvis)
+
+        def made(state: State, rest: State) -> tuple[Face, Array]:
+            return face(scene, self.on, UP, state, where), _way(scene, place, rest, 1)
+
+        seat, left = once_by(scene, [self.on], where, start, key, made)
+        return filled(self, place=place, face=seat, left=left)
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """Residual (1,) and its derivative (1, nv)."""
+        pelvis, middle, long = state.frame(self.place.frame), self.face.at(state)[0], float(self.face.half.max())
+        left = (pelvis.rotation @ self.left)[None]
+        rows = between(state, through(middle, left), self.place.joint, self.face.joint)
+        return left @ (pelvis.translation - middle) / long, rows / long
+
+
 class AtAngles(NamedTuple):
     """Joints at angles: a row for each [rad]."""
 
@@ -143,6 +205,12 @@ class AtAngles(NamedTuple):
         moves = np.zeros((len(self.idx_v), state.model.nv))
         moves[np.arange(len(self.idx_v)), self.idx_v] = 1.0
         return state.q[self.idx_q] - self.angles, moves
+
+
+def _way(scene: Scene, place: inputs.Place, rest: State, axis: int) -> Array:
+    """Ahead or to the left (3,), axis 0 or 1, of who sits in the axes of the pelvis."""
+    root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
+    return np.asarray(rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, axis])
 
 
 def _thighs(scene: Scene, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:

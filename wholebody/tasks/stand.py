@@ -25,7 +25,7 @@ from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, face
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_beyond, segments_on, surface
 
-STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0))  # of a `Stance`: 1/m^2, 1/m^2, 1/rad^2: ESTIMATE
+STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/m^2, but 1/rad^2 of the angle: ESTIMATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,20 +136,26 @@ class Stand(TermOfParts):
 
 @dataclass(frozen=True, eq=False)
 class Stance(SumOfSquares):
-    """Squared distance of two feet from side by side, as far apart and turned as in the figure's first posture.
+    """Squared distance of two feet from side by side, as in the figure's first posture, and from equal load.
 
-    ``60 f^2 + 60 w^2 + 4 t^2``: f is by how much one foot is ahead of the other, w by how much their distance to the
-    side differs from that of the posture, each the mean of what either foot sees [m], t the sine of the angle between
-    them, likewise. A person of median size has 0.17 m in the posture, with parallel feet. People who stand as they like
-    have 0.165 m (standard deviation 0.038), or 0.203 m (0.046); for what the weights are, see docs/theory/person.md.
+    ``60 f^2 + 60 w^2 + 4 t^2 + 600 (x^2 + y^2)``: f is by how much one foot is ahead of the other, w by how much their
+    distance to the side differs from that of the posture, each the mean of what either foot sees [m], t the sine of the
+    angle between them, likewise. A person of median size has 0.17 m in the posture, with parallel feet. People who
+    stand as they like have 0.165 m (standard deviation 0.038), or 0.203 m (0.046). x and y are how far the centre of
+    mass is ahead of the feet's middle, beyond what it is in the posture, and beside it [m]: without them, of a task
+    that is the same on the left and on the right, the answer is on one foot. For what the weights are, see
+    docs/theory/person.md.
 
-    A person who stands by `Stand` on two feet has this measure by default.
+    A person who stands by `Stand` on two feet has this measure by default; where each is on a thing of its own, without
+    x and y.
 
     Attributes:
         feet: the two feet.
         weight: factor on the measure.
         places: of the two, once resolved.
-        rest: (3,) f, w and t in the posture; f is 1 mm more, so that a split stance has one side, not that of rounding.
+        rest: (5,) f, w, t, x and y in the posture.
+        mass: joints of the figure whose centre of mass it is; None for all.
+        factors: (5,) roots of the weights.
 
     Raises:
         InputError: a value of the wrong kind, shape or range.
@@ -163,30 +169,42 @@ class Stance(SumOfSquares):
     weight: inputs.Weight = 1.0
     places: tuple[inputs.Place, inputs.Place] = field(init=False, repr=False)
     rest: Array = field(init=False, repr=False)
+    mass: range | None = field(init=False, repr=False)
+    factors: Array = field(init=False, repr=False)
 
     def resolve(self, scene: Scene, start: Array) -> Stance:
         """Find the feet, and how they are in the first posture."""
         if len(self.feet) != 2:
             raise InputError(f"Stance: feet has {len(self.feet)} names; give two")
         places = tuple(inputs.find_place(scene, foot, "Stance") for foot in self.feet)
-        found = filled(self, places=places, rest=np.zeros(3))
+        mass = inputs.joints_with_mass(scene, "Stance", self.feet)
+        found = filled(self, places=places, rest=np.zeros(5), mass=mass, factors=np.sqrt(STANCE_WEIGHTS))
         with scene.figure.posed(scene.figure.neutral) as upright:
-            rest = found.squares(upright)[0] / np.sqrt(STANCE_WEIGHTS)
-        return filled(found, rest=rest + (0.001, 0.0, 0.0))  # m: of a split stance and its mirror image one is lower
+            return filled(found, rest=found.squares(upright)[0] / found.factors)
+
+    def of_feet(self) -> Stance:
+        """Itself, resolved, without the load."""
+        return filled(self, factors=np.append(self.factors[:3], (0.0, 0.0)))
 
     def squares(self, state: State) -> tuple[Array, Array]:
-        """Residuals (3,) and their derivatives (3, nv)."""
+        """Residuals (5,) and their derivatives (5, nv)."""
         (one, other), joints = (state.frame(place.frame) for place in self.places), [p.joint for p in self.places]
-        values, rows = np.zeros(3), np.zeros((3, state.model.nv))
+        values, rows = np.zeros(5), np.zeros((5, state.model.nv))
+        center, moves = state.center_of_mass(self.mass), state.center_of_mass_jacobian(self.mass)
         for a, b, sign, (joint, against) in ((one, other, 0.5, joints[::-1]), (other, one, -0.5, joints)):
             axes = sign * a.rotation[:, :2].T
             values[:2] += axes @ (b.translation - a.translation)
             rows[:2] += between(state, through(b.translation, axes), joint, against)
+            ways, away = 0.5 * a.rotation[:, :2].T, LEVEL * (center - a.translation)
+            flat = LEVEL * ways  # on a slope too
+            turned = through(a.translation, flat)
+            turned[:, 3:] += ways @ pin.skew(away).T
+            values[3:] += flat @ away
+            rows[3:] += flat @ moves - between(state, turned, against, 0)
         left, ahead = one.rotation[:, 1], other.rotation[:, 0]
         values[2] = left @ ahead
         rows[2] = between(state, np.append(np.zeros(3), cross(ahead, left))[None], joints[1], joints[0])[0]
-        factors = np.sqrt(STANCE_WEIGHTS)
-        return factors * (values - self.rest), factors[:, None] * rows
+        return self.factors * (values - self.rest), self.factors[:, None] * rows
 
 
 def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[list[Array], list[int]]:
@@ -203,6 +221,7 @@ def _lows(bears: Surface, rest: State, under: Array, within: float) -> tuple[lis
 
 
 BELOW = np.array((1.0, 1.0, -1.0))  # x, y and down by x, y and z
+LEVEL = np.array((1.0, 1.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
