@@ -208,3 +208,15 @@ def test_measures_of_joints_that_slide_are_minimised_too(method: Any) -> None:
     found = wb.solve(problem, method)
     assert found.solved, found.message
     np.testing.assert_allclose(found.q, 0.6, atol=1e-5)
+
+
+def test_a_figure_of_an_assembly_keeps_a_constraint_of_ones_own(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A bar is fixed to the tip, so the answer is the arm's alone, whose first two angles have a product."""
+    arm = planar_arm((0.3, 0.3, 0.2))
+    made = wb.Assembly().figure("arm", arm, [0.4, 0.3, 0.6], constraints=[Product(0.3, 0.3)])
+    target = arm.placement(np.array([0.5, 0.6, 0.2]), "tip").translation
+    made.body("bar", made.placement("arm/tip").translation).fixed("arm/tip", "bar").point_goal("bar", target)
+    assert made.solve(tolerance=1e-8).status == "solved"
+    q = made.posture("arm")
+    assert q[0] * q[1] == pytest.approx(0.3, abs=1e-7)
+    assert made.placement("arm/tip").translation == pytest.approx(target, abs=1e-7)

@@ -13,7 +13,6 @@ import wholebody as wb
 from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.geometry.penetration import global_depth
 from wholebody.methods.ccd.frames import resolve_overlap
-from wholebody.methods.ccd.resolver import OverlapResolver
 
 
 def _wall(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
@@ -138,7 +137,7 @@ def test_what_is_left_is_said_of_the_posture_that_is_shown(avatar: wb.Figure, de
 def test_cancelling_normals_do_not_hold_a_link_inside(
     planar_arm: Callable[..., Any], deepest: Callable[..., float]
 ) -> None:
-    """A link on both sides of a thin wall: PD_g is zero there (figure 4b of Schmidl and Lin), the separation is not."""
+    """A link on both sides of a thin wall: PD_g is zero there (figure 4b of Schmidl and Lin), but not beside it."""
     scene = wb.Scene(planar_arm((0.3, 0.3, 0.3)))
     scene.attach(wb.Sphere(0.02), to="link2", name="knob", at=(0.15, 0.06, 0.0))
     scene.add(wb.Box((0.2, 0.03, 0.4)), name="wall", at=(0.75, 0.03, 0.0))
@@ -146,10 +145,11 @@ def test_cancelling_normals_do_not_hold_a_link_inside(
     contacts = scene.contacts(straight, within=0.0)
     assert len(contacts.distance) == 2
     assert global_depth(-contacts.distance, contacts.normal) == pytest.approx(np.zeros(3), abs=1e-6)
-    q, left = OverlapResolver(scene, scene.workspace()).resolve(straight, np.random.default_rng(0))
-    assert not left
-    assert deepest(scene, q) <= 1e-4
-    assert np.abs(q).max() < 0.4
+    problem = wb.Problem(scene, straight, goals=[wb.Point("tip", (0.9, 0.0, 0.0))])
+    for seed in range(5):
+        (q,) = wb.methods.CCD(seed=seed).tracker(problem, 0.1).overlap_resolutions(straight)
+        assert deepest(scene, q) <= 1e-4
+        assert np.abs(q).max() < 0.7
 
 
 def test_a_joint_that_moves_no_point_follows_what_is_tracked() -> None:

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.geometry.penetration import least_separation
 from wholebody.methods.ccd.guards import Kept, cone_guards, guards
 from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, seen_from, three
 from wholebody.methods.ccd.sweep import Aims
@@ -58,16 +56,14 @@ class _Side(NamedTuple):
 class LinkFinder:
     """Finds the overlapping link of one chain."""
 
-    def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
-        """Prepare the joints of the chain, links but those of `foreign` joints; `exact`: where PD_g cancels."""
-        self._exact = exact
-        self._workspace, self._limbs = workspace, limbs
+    def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int]) -> None:
+        """Prepare the joints of the chain, links but those of `foreign` joints."""
+        self._owners, self._limbs = workspace.owners, limbs
         self._carrier = [limbs.carrier(joint) for joint in range(workspace.model.njoints)]
         self._own = list(self._carrier)
         for joint in range(1, workspace.model.njoints):
             if joint not in limbs.node_of and (joint in foreign or self._own[int(workspace.model.parents[joint])] < 0):
                 self._own[joint] = -1
-        self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
     def link(self, overlaps: Sequence[Overlap], deepest: bool) -> Link | None:
         """The overlapping link nearest to the root, or `deepest` inside; None if no joint can change an overlap."""
@@ -102,11 +98,10 @@ class LinkFinder:
 
     def _push(self, overlaps: Sequence[tuple[Overlap, bool]]) -> Vector:
         """The translation whose component along the PD_g of every obstacle is at least its length."""
-        owners = self._workspace.owners
         by_owner: dict[str, list[tuple[Overlap, bool]]] = {}
         for overlap, is_a in overlaps:
-            by_owner.setdefault(owners[overlap.b if is_a else overlap.a], []).append((overlap, is_a))
-        pushes = [self._global_depth(owner, group) for owner, group in by_owner.items()]
+            by_owner.setdefault(self._owners[overlap.b if is_a else overlap.a], []).append((overlap, is_a))
+        pushes = [_global_depth(group) for group in by_owner.values()]
         x, y, z = pushes[0]
         for _ in range(4 if len(pushes) > 1 else 0):  # two walls need one, wedges a few
             for px, py, pz in pushes:
@@ -116,44 +111,17 @@ class LinkFinder:
                     x, y, z = x + shortfall * px, y + shortfall * py, z + shortfall * pz
         return x, y, z
 
-    def _global_depth(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector:
-        """Equation 1 for the link and one obstacle; the exact separation if the normals cancel."""
-        if len(group) == 1:
-            overlap, is_a = group[0]
-            size = -overlap.depth if is_a else overlap.depth
-            return size * overlap.normal[0], size * overlap.normal[1], size * overlap.normal[2]
-        x = y = z = total = 0.0
-        for overlap, is_a in group:
-            square = overlap.depth * (-overlap.depth if is_a else overlap.depth)
-            x += square * overlap.normal[0]
-            y += square * overlap.normal[1]
-            z += square * overlap.normal[2]
-            total += overlap.depth
-        x, y, z = x / total, y / total, z / total
-        deepest = max(overlap.depth for overlap, _ in group)
-        # a short PD_g says that normals cancel, as in figure 4b of the paper
-        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= 0.3 * deepest:
-            return x, y, z
-        return self._separation(owner, group) or (x, y, z)
 
-    def _separation(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector | None:
-        """Least translation of the link's pieces out of all pieces of the obstacle; None if there is none."""
-        workspace = self._workspace
-        mine = tuple(sorted({overlap.a if is_a else overlap.b for overlap, is_a in group}))
-        if (mine, owner) not in self._masks:
-            theirs = [k for k, name in enumerate(workspace.owners) if name == owner]
-            tested = {frozenset(pair) for pair in workspace.table.pairs.tolist()}
-            mask = np.array([[frozenset((i, j)) in tested for j in theirs] for i in mine])
-            self._masks[mine, owner] = theirs, mask
-        theirs, mask = self._masks[mine, owner]
-        placed, pieces = workspace.proximity.results.oMg, workspace.geometry.geometryObjects
-        way = least_separation(
-            [(pieces[k].geometry, placed[k]) for k in mine], [(pieces[k].geometry, placed[k]) for k in theirs], mask
-        )
-        if not way.separated:
-            return None
-        x, y, z = way.translation.tolist()
-        return x, y, z
+def _global_depth(group: Sequence[tuple[Overlap, bool]]) -> Vector:
+    """Equation 1 for the link and one obstacle."""
+    x = y = z = total = 0.0
+    for overlap, is_a in group:
+        square = overlap.depth * (-overlap.depth if is_a else overlap.depth)
+        x += square * overlap.normal[0]
+        y += square * overlap.normal[1]
+        z += square * overlap.normal[2]
+        total += overlap.depth
+    return x / total, y / total, z / total
 
 
 class Tracked(NamedTuple):
@@ -181,13 +149,12 @@ class ChainResolver:
         foreign: frozenset[int],
         tip: int,
         kept: Kept,
-        exact: bool,
     ) -> None:
         """Prepare a chain; `foreign` are the joints of the other chains, `tip` is the frame at its end."""
         self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
         self._base = int(scene.model.parents[joints[0]])
-        self.finder = LinkFinder(workspace, self.limbs, foreign, exact)
+        self.finder = LinkFinder(workspace, self.limbs, foreign)
         self._guards = guards(scene.figure, self.limbs, kept)
         self._cones = cone_guards(scene.figure, self.limbs, kept)
         self._tip = three(scene.model.frames[tip].placement.translation)

@@ -146,7 +146,7 @@ class FrameResolver:
 
     def __init__(self, scene: Scene) -> None:
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
-        self._resolver = OverlapResolver(scene, self._workspace, exact=False)
+        self._resolver = OverlapResolver(scene, self._workspace)
         self._data = scene.model.createData(), scene.model.createData()  # at the tracked posture, and as shown before
         self._tracked = Tracked(*(data.oMi for data in self._data))
         self._attraction = Attraction(scene, self._resolver)

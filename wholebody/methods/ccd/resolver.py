@@ -52,9 +52,9 @@ class OverlapResolver:
         tracked: joint placements whose orientation links that are translated take; None for that which they have.
     """
 
-    def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED, *, exact: bool = True) -> None:
-        """Prepare for clearances of zero; `begin` takes others, and `exact` is as in `LinkFinder`: up to 0.1 s."""
-        self.exact, self.margin = exact, MARGIN
+    def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED) -> None:
+        """Prepare for clearances of zero; `begin` takes others."""
+        self.margin = MARGIN
         self.tracked: Tracked | None = None
         self.scene, self.workspace, self._kept = scene, workspace, kept
         self.begin(None, TOLERANCE, Control(np.inf))
@@ -77,9 +77,7 @@ class OverlapResolver:
         }
         everything = frozenset(joint for joints, _ in named.values() for joint in joints)
         return {
-            name: ChainResolver(
-                self.scene, self.workspace, joints, everything - set(joints), tip, self._kept, self.exact
-            )
+            name: ChainResolver(self.scene, self.workspace, joints, everything - set(joints), tip, self._kept)
             for name, (joints, tip) in named.items()
             if joints
         }
@@ -127,7 +125,7 @@ class OverlapResolver:
                     break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps, deepest)
             if overlaps and self.deepest > 0.98 * before:  # the pass gained too little
-                if deepest or not self.exact:
+                if deepest or most_work < np.inf:  # within a frame there is no time for it
                     break
                 deepest = True  # a forearm that cannot leave keeps the hand from its turn
         return q, overlaps

@@ -128,7 +128,7 @@ class AssemblyBodies:
             name: one that no body and no other figure has.
             figure: such as `wb.load("human")`.
             start: (nq,) posture, or the name of one of the figure's; None for its first posture.
-            constraints: of it, such as `wb.Hold("left_foot")` and `wb.Balance()`, none of a class of your own.
+            constraints: of it, such as `wb.Hold("left_foot")` and `wb.Balance()`, or of a class of your own.
             color: of its pieces.
 
         Raises:

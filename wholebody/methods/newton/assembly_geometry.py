@@ -21,7 +21,6 @@ from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.terms import bound_equations, constraint_equations
 from wholebody.problem import Problem
-from wholebody.tasks.answers import is_own
 
 Solid = tuple[Shape, Any]
 """A shape, and its placement (pin.SE3) in its body."""
@@ -104,12 +103,6 @@ class AssemblyFigure(FigureBodies):
         bounds = bound_equations(problem, self, State(problem.scene.model))
         sets = (self.equations, constraints, bounds)
         self.batches: list[Batch] = [self.limits, *(batch for one in sets for batch in one.batches())]
-        for number, term in enumerate(problem.constraints):
-            if is_own(term):
-                raise InputError(
-                    f"figure {name!r}: constraints[{number}], {type(term).__name__} is of a class of your own, which "
-                    "figures of an assembly do not take; write it as a wb.methods.AssemblyConstraint"
-                )
         for batch in self.batches:
             batch.labels = [f"{name!r}, {label}" for label in batch.labels]
 

@@ -166,7 +166,10 @@ class AssemblySystem(ActiveSystem):
     ) -> None:
         """Take constraints and weights (7 n,); `to_scene` gives the scene's posture (nq,) at variables (7 n,)."""
         super().__init__(held, weight, algebra, figures, objective)
-        self._to_scene, self.revision, self.own_terms = to_scene, revision, objective is not None
+        self._to_scene, self.revision = to_scene, revision
+        self.own_terms = objective is not None or any(
+            is_own(term) for one in figures for term in one.problem.constraints
+        )
 
     def among(self, scene: Scene, clearance: float) -> None:
         """Let the pairs of a scene of the bodies touch, at a distance of at least `clearance` metres."""
