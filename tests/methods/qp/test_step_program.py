@@ -145,7 +145,7 @@ def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
         assert answer.exact
         contacts = slice(len(program.least) - len(at.gap), None)
         room = (program.elastic @ wanted.x - rows.elastic_violation)[contacts].min(initial=np.inf)
-        assert answer.spare == pytest.approx(room, abs=1e-8) or answer.by != "active set"
+        assert answer.spare == pytest.approx(room, abs=1e-8)
         displacement = answer.x.copy() if number % 7 else 0.5 * answer.x
         q = pin.integrate(workspace.model, q, displacement)
         compiled.ended(q, displacement, number % 7 != 0)
