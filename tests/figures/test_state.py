@@ -76,7 +76,7 @@ def test_center_of_mass_and_its_derivative(human):
             pin.integrate(human.model, q, -1e-6 * direction)
         )
         assert derivative[:, k] == pytest.approx(change / 2e-6, abs=1e-8)
-    assert np.array_equal(state.jacobian, jacobian)  # Pinocchio's routine would have overwritten it
+    assert np.array_equal(state.jacobian, jacobian)
 
 
 def test_an_update_forgets_the_posture_before(human):
