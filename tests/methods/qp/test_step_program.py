@@ -183,6 +183,18 @@ def test_a_body_that_meets_an_obstacle_keeps_its_feet_and_the_order_of_its_speed
         assert max(np.abs(foot.value(scene.state(q))).max() for q in postures) < 2e-6
 
 
+def test_a_program_that_the_solver_closes_says_what_room_it_leaves(scene: wb.Scene) -> None:
+    """Without a hot start the room was unknown, and every step along something was looked at again."""
+    problem = wb.Problem(scene, clearance=0.01, **PROBLEMS["into a block"])
+    workspace = problem.workspace()
+    step = StepProgram(problem, workspace, WorkingSet(make_solver("osqp", hot_start=False)), DT)
+    at = problem.lineariser(workspace, DT).packed(problem.start, 0.06)
+    answer = step.solve(at, measures=True)
+    after = step.program.elastic @ answer.x - step.rows.elastic_violation
+    assert answer.by != "active set"
+    assert answer.spare == pytest.approx(after[len(after) - len(at.gap) :].min(), abs=1e-12)
+
+
 def test_feet_stay_where_a_body_comes_away_from_an_obstacle() -> None:
     """The reach that every tool makes: into a box, along inside of it, and out, where the hand catches up fast."""
     reach = track("contact")
