@@ -191,7 +191,7 @@ class State:
 
     def center_of_mass_jacobian(self, joints: range | None = None) -> Array:
         """(3, nv) Jacobian of the centre of mass of all, or of what joints carry."""
-        if joints is None and self._columns is None:  # the placements and columns that it writes are those that are there
+        if joints is None and self._columns is None:  # it writes placements and columns as they are
             return np.array(pin.jacobianCenterOfMass(self.model, self.data, self.q)).reshape(3, -1)
         joints = range(1, self.model.njoints) if joints is None else joints
         mass, moment = self._moments(joints)
