@@ -307,7 +307,7 @@ def ends(value: Array, jacobian: Array, low: Array, high: Array) -> SupportingPl
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
     if not len(near):
         return none
-    return none._replace(value=value[near], jacobian=np.concatenate([jacobian, -jacobian])[near], key=near)
+    return with_values(none, value=value[near], jacobian=np.concatenate([jacobian, -jacobian])[near], key=near)
 
 
 def no_planes(nv: int) -> SupportingPlanes:
