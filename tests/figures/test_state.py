@@ -76,7 +76,17 @@ def test_center_of_mass_and_its_derivative(human):
             pin.integrate(human.model, q, -1e-6 * direction)
         )
         assert derivative[:, k] == pytest.approx(change / 2e-6, abs=1e-8)
-    assert np.array_equal(state.jacobian, jacobian)  # Pinocchio's routine would have overwritten it
+    assert np.array_equal(state.jacobian, jacobian)
+
+
+def test_the_center_of_mass_needs_no_second_data(human, monkeypatch):
+    """Data of a person with fingers has 27 MB of second derivatives, which take 15 ms to make."""
+    state = State(human.model).update(random_posture(human, 3))
+    monkeypatch.setattr(pin.Model, "createData", lambda model: pytest.fail("data are made"))
+    joints, jacobian = state.joints.copy(), state.jacobian.copy()
+    assert state.center_of_mass_jacobian().shape == (3, human.model.nv)
+    assert np.array_equal(state.joints, joints)
+    assert np.array_equal(state.jacobian, jacobian)
 
 
 def test_an_update_forgets_the_posture_before(human):

@@ -35,14 +35,14 @@ def objective(program: QuadraticProgram, x: Array) -> float:
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
     """Return what `solve_from` returns."""
     active = guess
-    for attempt in range(corrections):
+    for _ in range(corrections):
         point = minimise_on_face(program, active)
         if point is None:
             return None
         following = _corrected(program, active, point)
         if same(following, active):
             return QPSolution(np.clip(point.x, program.lower, program.upper), active, True, 0)
-        active = following if attempt < CORRECTIONS.at_once else _worst_corrected(program, active, following, point)
+        active = following
     return None
 
 
@@ -54,21 +54,6 @@ def _corrected(program: QuadraticProgram, active: ActiveSet, point: FacePoint) -
     lower = np.where(active.lower, gradient >= 0.0, x < program.lower - CORRECTIONS.tolerance)
     upper = np.where(active.upper, gradient <= 0.0, x > program.upper + CORRECTIONS.tolerance)
     return ActiveSet(lower, upper, elastic)
-
-
-def _worst_corrected(program: QuadraticProgram, active: ActiveSet, following: ActiveSet, point: FacePoint) -> ActiveSet:
-    """The active set with the one entry changed that is most wrong, in units of x."""
-    pull = np.abs(point.gradient) / program.diagonal
-    wrong_low = np.where(active.lower, pull, program.lower - point.x) * (following.lower != active.lower)
-    wrong_high = np.where(active.upper, pull, point.x - program.upper) * (following.upper != active.upper)
-    lack = program.least - program.elastic @ point.x
-    lack[active.elastic] = -point.push * (program.elastic[active.elastic] ** 2 @ (1.0 / program.diagonal))
-    wrong = np.concatenate([wrong_low, wrong_high, lack * (following.elastic != active.elastic)])
-    worst = int(np.argmax(wrong))
-    flat = np.concatenate([active.lower, active.upper, active.elastic])
-    flat[worst] = not flat[worst]
-    size = program.size
-    return ActiveSet(flat[:size], flat[size : 2 * size], flat[2 * size :])
 
 
 class FacePoint(NamedTuple):

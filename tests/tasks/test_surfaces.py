@@ -8,15 +8,15 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.figures.state import State
 from wholebody.tasks import grips
-from wholebody.tasks.contact_parts import through_each
+from wholebody.tasks.contact_parts import through
 from wholebody.tasks.surfaces import nearest
 
 
 def test_wrenches_are_forces_and_their_moments() -> None:
-    points, forces = np.random.default_rng(4).normal(size=(2, 5, 3))
-    expected = np.hstack([forces, np.cross(points, forces)])
-    np.testing.assert_allclose(through_each(points, forces), expected, atol=1e-15)
-    assert through_each(points[:0], forces[:0]).shape == (0, 6)
+    point, *forces = np.random.default_rng(4).normal(size=(6, 3))
+    expected = np.hstack([forces, np.cross(point, forces)])
+    np.testing.assert_allclose(through(point, np.array(forces)), expected, atol=1e-15)
+    assert through(point, np.zeros((0, 3))).shape == (0, 6)
 
 
 def test_what_a_posture_keeps_is_not_that_of_a_thing_moved_since() -> None:

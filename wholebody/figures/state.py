@@ -71,7 +71,6 @@ class State:
         self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
         self._centers: dict[range | None, Array] = {}
-        self._spare: pin.Data | None = None
         self._companions: dict[object, State] = {}
         self.number, self.kept = 0, dict[object, Any]()
         self._asked = b""
@@ -191,16 +190,15 @@ class State:
         return mass, mass[:, None] * np.array(centers).reshape(-1, 3)
 
     def center_of_mass_jacobian(self, joints: range | None = None) -> Array:
-        """(3, nv) Jacobian of the centre of mass of all, or of what joints carry; on data of its own."""
-        if joints is not None:
-            mass, moment = self._moments(joints)
-            moved = self.support[joints.start : joints.stop].T  # a column moves what hangs on its joint
-            linear, turn = self.columns[:, :3], self.columns[:, 3:]
-            rows = (moved @ mass)[:, None] * linear + cross(turn, moved @ moment)
-            return self.folded(rows.T / mass.sum())
-        if self._spare is None:
-            self._spare = self.model.createData()
-        return np.array(pin.jacobianCenterOfMass(self.model, self._spare, self.q)).reshape(3, -1)
+        """(3, nv) Jacobian of the centre of mass of all, or of what joints carry."""
+        if joints is None and self._columns is None:  # it writes placements and columns as they are
+            return np.array(pin.jacobianCenterOfMass(self.model, self.data, self.q)).reshape(3, -1)
+        joints = range(1, self.model.njoints) if joints is None else joints
+        mass, moment = self._moments(joints)
+        moved = self.support[joints.start : joints.stop].T  # a column moves what hangs on its joint
+        linear, turn = self.columns[:, :3], self.columns[:, 3:]
+        rows = (moved @ mass)[:, None] * linear + cross(turn, moved @ moment)
+        return self.folded(rows.T / mass.sum())
 
 
 def _restored(model: pin.Model, q: Array) -> State:

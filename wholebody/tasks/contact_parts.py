@@ -109,12 +109,16 @@ class Gap(NamedTuple):
         edges = crossed_edges(self.first, self.second, near)
         ahead = faces_met(self.first, self.second, near.pieces, near.where, edges)
         back = faces_met(self.second, self.first, near.pieces[::-1], near.where[::-1])
-        value, normals, points = (np.concatenate(part) for part in zip(ahead[:3], back[:3], strict=True))
-        key, counts = np.concatenate([ahead.key, back.key + MOST_FACES]), (len(ahead.key), len(back.key))
-        of, against = np.array([(near.against, near.joint), (near.joint, near.against)]).repeat(counts, axis=1)
-        rows = state.rows(through_each(points, normals), of, against)
+        value, normals, points, key = ahead
+        if len(back.key):
+            value, normals, points, key = (np.concatenate(part) for part in zip(ahead, back, strict=True))
+            key[len(ahead.key) :] += MOST_FACES
+        wrench = np.concatenate((normals, cross(points, normals)), axis=1)
+        wrench[len(ahead.key) :] *= -1.0  # of the second surface against the first
+        rows = between(state, wrench, near.against, near.joint)
         if self.own is None or self.own.flat:
-            turned = through(near.point, bends(self.first, self.second, near))
+            turned = bends(self.first, self.second, near)
+            turned = through(near.point, turned) if len(turned) else turned
         else:
             turned = self.own.bends(self.second, state)
         bend = between(state, turned, near.joint, near.against) if len(turned) else rows[:0]
@@ -232,14 +236,6 @@ def through(point: Array, forces: Array) -> Array:
     return np.concatenate((forces, forces @ pin.skew(point).T), axis=1)
 
 
-def through_each(points: Array, forces: Array) -> Array:
-    """Wrenches (k, 6) of forces (k, 3), each through a point of its own (k, 3)."""
-    (x, y, z), crossed = points.T, np.zeros((len(points), 3, 3))
-    crossed[:, 0, 1], crossed[:, 0, 2], crossed[:, 1, 2] = -z, y, -x
-    crossed[:, 1, 0], crossed[:, 2, 0], crossed[:, 2, 1] = z, -y, x
-    return np.concatenate((forces, (forces[:, None] @ crossed.transpose(0, 2, 1))[:, 0]), axis=1)
-
-
 def between(state: State, wrench: Array, joint: int, against: int) -> Array:
     """Rows (m, nv) of wrenches (m, 6) on one joint against another."""
     return state.wrench_jacobian(Wrench(wrench, joint, against))
@@ -307,10 +303,11 @@ def beyond(value: Array, jacobian: Array, low: Array, high: Array) -> tuple[Arra
 
 def ends(value: Array, jacobian: Array, low: Array, high: Array) -> SupportingPlanes:
     """Planes of the ends of the ranges of values (k,) with their derivative (k, nv); without those far beyond."""
-    value, jacobian = np.concatenate([value - high, low - value]), np.vstack([jacobian, -jacobian])
+    value, none = np.concatenate([value - high, low - value]), no_planes(jacobian.shape[1])
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
-    none = no_planes(jacobian.shape[1])
-    return with_values(none, value=value[near], jacobian=jacobian[near], key=near)
+    if not len(near):
+        return none
+    return with_values(none, value=value[near], jacobian=np.concatenate([jacobian, -jacobian])[near], key=near)
 
 
 def no_planes(nv: int) -> SupportingPlanes:

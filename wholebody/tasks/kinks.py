@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import atan2, cos, hypot, isfinite, sin, sqrt
 from typing import Any, NamedTuple
 
 import coal
@@ -82,9 +82,10 @@ def crossed_edges(first: Surface, second: Surface, near: Nearest) -> Array:
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
     if not sharp or abs(near.distance) > STEP:
         return NO_EDGES
-    crossed = _slid(first, second, near, across(near.normal)[:2], EDGE).reshape(4, 2, 3)
+    met = _slid(first, second, near, across(near.normal), EDGE)
+    crossed = np.array([(each.normal, each.getNearestPoint1()) for each in met])
     crossed[:, 0] *= -1.0
-    return np.asarray(crossed[np.linalg.norm(crossed[:, 0], axis=1) > 0.5])
+    return np.asarray(crossed[np.einsum("ij,ij->i", crossed[:, 0], crossed[:, 0]) > 0.25])
 
 
 def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -> Array:
@@ -93,26 +94,28 @@ def bends(first: Surface, second: Surface, near: Nearest, radius: float = 0.0) -
     round_by = max(_roundness(first, i), radius) + _roundness(second, j)
     if round_by == 0.0:
         return np.zeros((0, 3))
-    along = across(near.normal)[:2]
+    along = across(near.normal)
     # share of the radius, by which pieces are moved along each other to see how their normal turns
     step = 1e-2 * round_by
-    normals = _slid(first, second, near, along, step)[:, :, 0]
-    turned = (along @ (normals[:, 1] - normals[:, 0])[:, :, None])[:, :, 0] / (2.0 * step)
-    values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
-    values = np.where(np.isfinite(values), np.minimum(np.maximum(values, 0.0), 2.0 / round_by), 0.0)
-    return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
+    normals = np.array([met.normal for met in _slid(first, second, near, along, step)])
+    (xx, xy), (yx, yy) = ((normals[1::2] - normals[::2]) @ along[:2].T / (2.0 * step)).tolist()
+    turn, mean = 0.5 * atan2(xy + yx, xx - yy), 0.5 * (xx + yy)  # of the first principal direction
+    swing, found = 0.5 * hypot(xy + yx, xx - yy), []
+    for value, x, y in ((mean - swing, -sin(turn), cos(turn)), (mean + swing, cos(turn), sin(turn))):
+        if value > 0.0:  # not where it is NaN
+            root = sqrt(min(value, 2.0 / round_by))
+            found.append((root * x, root * y))
+    return np.array(found).reshape(-1, 2) @ along[:2]
 
 
-def _slid(first: Surface, second: Surface, near: Nearest, along: Array, step: float) -> Array:
-    """Normals and points on the first piece (2, 2, 2, 3), with the second slid back and on along two ways (2, 3)."""
+def _slid(first: Surface, second: Surface, near: Nearest, along: Array, step: float) -> list[Any]:
+    """What coal finds with the second piece slid back and on along the first and the second of some ways (k, 3)."""
     i, j = near.pieces
     at, place = near.places
-    ours, theirs, found = coal.Transform3s(at), coal.Transform3s(place), np.empty((2, 2, 2, 3))
-    for row, ends in enumerate(place.translation + step * np.array([-along, along])):
-        for way, end in enumerate(ends):
-            theirs.setTranslation(end)
-            met = between_transforms(first.shapes[i], ours, second.shapes[j], theirs)
-            found[way, row, 0], found[way, row, 1] = met.normal, met.getNearestPoint1()
+    ours, theirs, origin, found = coal.Transform3s(at), coal.Transform3s(place), place.translation, []
+    for way in (-step * along[0], step * along[0], -step * along[1], step * along[1]):
+        theirs.setTranslation(origin + way)
+        found.append(between_transforms(first.shapes[i], ours, second.shapes[j], theirs))
     return found
 
 

@@ -65,9 +65,10 @@ def test_the_compiled_loop_is_the_array_code(k):
         for iterations in ((1, 2, 5)[number % 3], *((300,) if number < 3 else ())):
             x, active, used = minimise(program, start, iterations)
             expected, its_active, its_used = semismooth_newton.minimise(program, start, iterations)
-            assert np.abs(x - expected).max() < 1e-10
+            # Faces on the way are minimised to 1e-8; the last one is looked at again, to 1e-11.
+            assert np.abs(x - expected).max() < (1e-10 if iterations == 300 else 1e-7)
             if iterations < 300:
-                assert used == its_used
+                assert its_used <= used <= its_used + 1
                 assert same(active, its_active)
 
 

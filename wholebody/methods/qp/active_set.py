@@ -102,7 +102,7 @@ def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[
 def last_resort(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
     """Exact answer by semismooth Newton steps where an approximate one x (n,), of `iterations`, does not lead to it."""
     x, active, used = minimise(program, x, 300)  # the hardest programs seen took 63
-    solution = solve_from(program, active, CORRECTIONS.of_guess)
+    solution = solve_from(program, active, CORRECTIONS.most)
     if solution is not None:
         return with_values(solution, iterations=iterations + used, by=SEMISMOOTH)
     exact = program.optimality(x) <= 1e-10

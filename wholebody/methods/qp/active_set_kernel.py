@@ -64,14 +64,13 @@ def _primal_dual_active_set(
     program: QuadraticProgram, places: Indices, active: ActiveSet, most: int, limits: Corrections, room: Room, x: Array
 ) -> bool:
     """Correct an active set for the rows `places` (c,), in place; x (n,) becomes the minimiser. Whether it is right."""
-    # The first corrections change all wrong entries, later ones only the worst.
     elastic, lower, upper = program.elastic, program.lower, program.upper
     pushing = active.elastic
     n, m, k = len(program.diagonal), len(program.target), len(places)
     own, pushes = face(room.work, n, m, k), room.places[len(room.places) // 2 :]
     reached = own.reached
     stack_soft(program, own)
-    for attempt in range(most):
+    for _ in range(most):
         size = m
         for c in range(k):
             if pushing[places[c]]:
@@ -82,7 +81,7 @@ def _primal_dual_active_set(
             return False
         for c in range(k):
             reached[c] = dot(elastic[places[c]], x)
-        if not _correct(program, places, active, own, limits.tolerance, x, attempt < limits.at_once):
+        if not _correct(program, places, active, own, limits.tolerance, x):
             for i in range(n):
                 x[i] = min(max(x[i], lower[i]), upper[i])
             return True
@@ -91,52 +90,27 @@ def _primal_dual_active_set(
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct(
-    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array, every: bool
+    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
 ) -> bool:
-    """Put right every wrong entry of an active set, or the one that is most wrong in units of x; whether any was."""
-    diagonal, target, elastic = program.diagonal, program.target, program.elastic
+    """Put right every wrong entry of an active set; whether any was."""
     least, lower, upper = program.least, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
-    worst, mask, place, found = -np.inf, at_lower, 0, False
+    found = False
     for i in range(len(x)):
         low = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
         high = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
-        if low == at_lower[i] and high == at_upper[i]:
-            continue
-        found = True
-        if every:
-            at_lower[i], at_upper[i] = low, high
-            continue
-        pull = abs(gradient[i]) / diagonal[i]
-        wrong = pull if at_lower[i] else lower[i] - x[i]
-        if low != at_lower[i] and wrong > worst:
-            worst, mask, place = wrong, at_lower, i
-        wrong = pull if at_upper[i] else x[i] - upper[i]
-        if high != at_upper[i] and wrong > worst:
-            worst, mask, place = wrong, at_upper, i
-    following = len(target)
+        found = found or low != at_lower[i] or high != at_upper[i]
+        at_lower[i], at_upper[i] = low, high
+    following = len(program.target)
     for c in range(len(places)):
         j = places[c]
-        push, wrong = reached[c] < least[j] - tolerance, least[j] - reached[c]
+        push = reached[c] < least[j] - tolerance
         if pushing[j]:
-            push, wrong = multiplier[following] <= 0.0, multiplier[following]
+            push = multiplier[following] <= 0.0
             following += 1
-        if push == pushing[j]:
-            continue
-        found = True
-        if every:
-            pushing[j] = push
-            continue
-        if pushing[j]:
-            norm = 0.0
-            for i in range(len(x)):
-                norm += elastic[j, i] * elastic[j, i] / diagonal[i]
-            wrong *= norm
-        if wrong > worst:
-            worst, mask, place = wrong, pushing, j
-    if found and not every:
-        mask[place] = not mask[place]
+        found = found or push != pushing[j]
+        pushing[j] = push
     return found
 
 
@@ -159,10 +133,11 @@ def minimise(
     for i in range(n):
         at_lower[i] = x[i] <= lower[i] and gradient[i] >= 0.0
         at_upper[i] = x[i] >= upper[i] and gradient[i] <= 0.0 and not at_lower[i]
+    rough = 1e3 * tolerance  # a face before the last one only says which way to go: half as many in columns
     for used in range(1, iterations + 1):
         pushes = pushing.nonzero()[0]
         stack_elastic(program, pushes, own)
-        if not minimise_on_face(program, active, own, m + len(pushes), tolerance, end):
+        if not minimise_on_face(program, active, own, m + len(pushes), rough, end):
             return used
         for i in range(n):
             way[i] = 0.0 if at_lower[i] or at_upper[i] else end[i] - x[i]
@@ -175,8 +150,9 @@ def minimise(
             pull = gradient[i] / diagonal[i]
             if (at_lower[i] and -pull > STILL) or (at_upper[i] and pull > STILL):
                 at_lower[i] = at_upper[i] = right = False
-        if right:
+        if right and rough == tolerance:
             return used
+        rough = tolerance if right else rough
     return iterations
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.methods.qp.settings import PROGRAM
 
-NUMBERS = 29  # of `step_program.numbers_of`
+NUMBERS = 27  # of `step_program.numbers_of`
 SAME = 0.99  # cosine of the angle between two rows from which on they count as one
 
 

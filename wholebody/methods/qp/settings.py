@@ -41,9 +41,7 @@ class Corrections(NamedTuple):
     near: float = -0.03  # m: violation at x = 0 above which a row is in the first round. More: larger programs.
     rounds: int = 8  # most times that violated rows are added before all rows are in
     # corrections of one set before semismooth Newton steps. More: sets are corrected in vain; fewer: dearer steps.
-    most: int = 60
-    of_guess: int = 12  # corrections of a set that was guessed from an approximate answer
-    at_once: int = 8  # how many of them correct all that is wrong; as that may cycle, later ones change the worst entry
+    most: int = 12
     tolerance: float = 1e-11  # by which x may be out of its box and a row violated, radians and metres
 
 

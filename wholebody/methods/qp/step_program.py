@@ -194,7 +194,8 @@ class StepProgram:
         rows, program = self._parts.rows, self._parts.program
         answer = working.solve(program, rows.key)
         motion, turn = self.turning.motion(at, answer.x)
-        missed = float((rows.elastic_violation - rows.elastic @ answer.x).max(initial=0.0))
+        room = rows.elastic @ answer.x - rows.elastic_violation
+        missed, spare = -float(room.min(initial=0.0)), float(room[k - len(at.gap) :].min(initial=np.inf))
         remains = (rows.soft @ answer.x - program.target)[: self.goals]
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
         asked = STEP.damping * min(1.0, left / max(error, 1e-12)) if left > STEP.resting else 0.0
@@ -241,7 +242,7 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
 
 
 def numbers_of(scale: float) -> Array:
-    """The numbers of a tracker's programs, (29,), in the order in which `tracking_kernel` reads them."""
+    """The numbers of a tracker's programs, (27,), in the order in which `tracking_kernel` reads them."""
     size = StepSize(STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, True)
     return np.concatenate([
         size, PROGRAM, CORRECTIONS, WEIGHTS, (scale, STEP.damping, STEP.resting, STEP.curved),

@@ -34,7 +34,7 @@ def fixed_terms(fixed: Array, places: Indices, goals: int) -> Terms:
     """The terms among what does not change; see `solve`."""
     count, end = places[0], NUMBERS + goals
     bound = fixed[end : end + 2 * count].reshape((2, count))
-    return Terms(places[1 : count + 1], bound, fixed[NUMBERS:end], fixed[20:25])
+    return Terms(places[1 : count + 1], bound, fixed[NUMBERS:end], fixed[18:23])
 
 
 @compiled(inner=True, forceinline=True)
@@ -105,19 +105,19 @@ def solve(
     for r in range(goals):
         error += value[r] * value[r]
     error = max(np.sqrt(error), 1e-12)
-    damping = _run_ahead_of(before, q, rows, target, size, fixed[26:29], error)
+    damping = _run_ahead_of(before, q, rows, target, size, fixed[24:27], error)
     for i in range(n):
         own.columns[0, i], own.columns[1, i] = at.measure[1, i], at.measure[0, i]
         own.columns[2, i], own.columns[3, i] = at.box[0, i], at.box[1, i]
     damped = StepSize(size.radius, size.pull, damping, size.measures, size.gain)
-    fill_program(own.columns, rows, target, own.program.least, damped, fixed[5:14], fixed[25])
+    fill_program(own.columns, rows, target, own.program.least, damped, fixed[5:14], fixed[23])
     least_asked, worst = np.inf, 0.0
     for c in range(contacts):
         least_asked = min(least_asked, clearance[c])
     for violated in violations:
         worst = max(worst, violated)
     rounds = -1
-    limits = Corrections(fixed[14], int(fixed[15]), int(fixed[16]), int(fixed[17]), int(fixed[18]), fixed[19])
+    limits = Corrections(fixed[14], int(fixed[15]), int(fixed[16]), fixed[17])
     if hot:
         rounds = grow(own.program, rows.key, pushed, own.active, limits, own.room, x)
     if rounds < 0:
@@ -137,7 +137,7 @@ def solve(
         missed = max(missed, -ahead)
         if j >= one_sided:
             spare = min(spare, ahead)
-    asked = fixed[26] * min(1.0, left / error) if left > fixed[27] else 0.0
+    asked = fixed[24] * min(1.0, left / error) if left > fixed[25] else 0.0
     way, turn = moved(x, fixed_bodies(fixed, places, goals, columns, placement))
     return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 

@@ -48,7 +48,7 @@ class OSQPSolver(QPSolver):
         for limit in ROUNDS:
             iterations += workspace.run(limit)
             near = self.uncorrected = workspace.x()
-            solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
+            solution = solve_from(program, workspace.active(), CORRECTIONS.most)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=OSQPSolver.name)
         return last_resort(program, near, iterations)

@@ -74,7 +74,7 @@ class QpsolversSolver(QPSolver):
         self.uncorrected = x
         # an interior point keeps all multipliers above zero; those of active rows exceed the room that is left
         push, upper, lower = np.split(np.where(multiplier > np.maximum(room, 0.0), multiplier, 0.0), [k, k + n])
-        solution = solve_from(program, read_active(upper - lower, push), CORRECTIONS.of_guess)
+        solution = solve_from(program, read_active(upper - lower, push), CORRECTIONS.most)
         return last_resort(program, x, 1) if solution is None else with_values(solution, iterations=1, by=self.name)
 
     def _asked(self, program: QuadraticProgram) -> tuple[Array, Array, Array]:
