@@ -112,15 +112,13 @@ class Holds:
         dt: float,
         surface: Surface | None,
         touched: Touched | None = None,
-        span: float = SPAN,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
-        # `span` [s] is between the frames of the first pass and sweeps at most.
         # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
-        self._dt, self.span = dt, span
+        self._dt = dt
         contacts = () if touched is None else touched.contacts
         self.touches = bool(contacts)  # whether parts touch things, or each other
         # a part that touches a thing while it seems to rest on the ground rests on the thing
@@ -356,8 +354,9 @@ class Holds:
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))
-        # a new place keeps this share of the body's shift; the rest goes back with time
-        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.8 * shift
+        # a new place keeps a share of the body's shift, so that the rest goes back with time: with 0.8 a climber's feet
+        # fell half a metre behind its hands, which touch things where the recording does; with none a step may be long
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.3 * shift
         point = self.points[number]
         if point.edge:
             place[2] = self._height(number, place, stand, paths, frames)
