@@ -387,7 +387,8 @@ class Holds:
         sole = next(own for own in self._soles if number in own)
         free = np.mean([paths[frame][sole] for frame in frames], axis=0)
         beside = place[:2] + free[:, :2] - free[sole.index(number), :2]
-        found = [self._surface(np.array([*at, level + STEP])) for at in (place[:2], *beside)]
+        middle = (stand.first + stand.end) // 2
+        found = [self._surface(np.array([*at, level + STEP]), middle) for at in (place[:2], *beside)]
         known = [below for below in found if below is not None]
         if not known:
             return CLEARANCE + level

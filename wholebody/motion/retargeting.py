@@ -17,7 +17,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
-from wholebody.motion.carrying import as_carried, at_start, brought_back, carrier
+from wholebody.motion.carrying import as_carried, brought_back, carrier
 from wholebody.motion.clip import Clip, thing_tracks
 from wholebody.motion.files.base import check_one
 from wholebody.motion.held_points import held_points, touching_points
@@ -109,8 +109,7 @@ def retarget(
     if scene is not None and tracks and ground is not None and not isinstance(ground, Ground) and figure.root == "free":
         still_ground, joints = ground_on(motion, names, surface), skeleton_roles(motion, names)
         if on := carrier(motion, joints, scene, tracks, still_ground):
-            seen, others = as_carried(motion, scene, tracks, on)
-            there = at_start(scene, {on: tracks[on]})
+            seen, there, others = as_carried(motion, scene, tracks, on)
             rests = checked_ground(seen, figure, ground, names, surface_of(there, others))  # nobody is carried twice
             clip = retarget(seen, figure, there, rests, things=others, names=names, progress=progress)
             return brought_back(clip, tracks[on], tracks)
