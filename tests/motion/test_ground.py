@@ -238,6 +238,7 @@ def test_speed_limits_hold() -> None:
     slow.model.velocityLimit = limit
     clip = wb.retarget(motion, slow)
     assert np.abs(clip.velocities()[:, 6:]).max() < 3.0 * (1.0 + 1e-3)
+    assert not wb.check(clip).speeds
 
 
 @pytest.fixture
