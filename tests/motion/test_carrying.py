@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.motion.test_retargeting import person
+from tests.motion.test_ground import DT, flat, walker
+from tests.motion.test_retargeting import person, places
 from wholebody.motion.carrying import carrier
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.surfaces import surface_of
@@ -64,7 +65,7 @@ def test_who_is_left_by_a_lift_does_not_go_with_it(human: wb.Figure) -> None:
         scene, joints = among(human).add(wb.HalfSpace(), name="floor"), {name: name for name in motion.names}
         joints |= {f"{side}_toe": f"{side}_foot" for side in ("left", "right")}
         ground = wb.motion.ground(motion, scene=scene)
-        assert surface_of(scene, {"lift"})(np.array([0.0, 0.0, 1.0])) == pytest.approx(0.0, abs=1e-5)
+        assert surface_of(scene, without={"lift"})(np.array([0.0, 0.0, 1.0]), 0) == pytest.approx(0.0, abs=1e-5)
         assert carrier(motion, joints, scene, {"lift": track}, ground) == ("" if off else "lift")
 
 
@@ -83,3 +84,24 @@ def test_each_foot_keeps_its_place_on_a_ski_of_its_own(human: wb.Figure) -> None
     for side, way in ahead.items():
         heel = [human.placement(q, f"{side}_heel").translation[0] for q in clip.q]
         assert np.ptp(heel - way) < 0.01
+
+
+@pytest.mark.parametrize("boards", [False, True])
+def test_feet_go_from_a_lift_to_the_floor_that_it_meets_and_back(human: wb.Figure, boards: bool) -> None:
+    """A walker goes down on a lift and steps off it, or steps on it and goes up: half a metre in 1.2 s."""
+    motion, stood = walker(flat, 3.0)
+    share = np.clip((np.arange(len(motion)) * DT - (1.8 if boards else 0.0)) / 1.2, 0.0, 1.0)
+    high = 0.5 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    high = high if boards else 0.5 - high
+    along = 2.7 if boards else 0.3  # m: of the middle of the lift; the edge is between two footholds
+    lifted = motion.positions + np.outer(high, (0.0, 0.0, 1.0))[:, None]
+    scene = wb.Scene(human).add(wb.Box((3.0, 2.0, 0.1)), name="lift", at=(along, 0.0, -0.05))
+    scene.add(wb.HalfSpace(), name="floor")
+    track = np.array([(along, 0.0, z - 0.05, 0.0, 0.0, 0.0, 1.0) for z in high])
+    clip = wb.retarget(replace(motion, positions=lifted), human, scene, things={"lift": track})
+    for side, mask in stood.items():
+        heel = places(clip, f"{side}_heel")[mask]
+        steps = np.linalg.norm(np.diff(places(clip, f"{side}_heel")[:, :2], axis=0), axis=1)[mask[1:] & mask[:-1]]
+        assert np.abs(heel[:, 2] - high[mask]).max() < 0.01
+        assert steps.mean() < 0.01 * DT
+    assert wb.check(clip, scene).deepest < 1e-3

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.motion import posture_fit
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import Fitter, Goals, Layout
 
@@ -33,6 +34,21 @@ def test_a_short_lever_does_not_turn_past_a_place_that_it_cannot_reach(tmp_path:
             assert q[0] <= following[0] <= 0.1 + 1e-6  # the place nearest to it, by the arc
             q = following
     assert q[0] > 0.05
+
+
+def test_a_step_keeps_to_its_bounds_where_the_solver_keeps_to_them_to_rounding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """daqp may be 1e-6 beyond bounds: a joint of 1 rad/s was 1e-4 of its speed limit too fast at 120 frames a second."""
+    (path := tmp_path / "wrist.urdf").write_text(WRIST)
+    figure, solve = wb.load(path), posture_fit.daqp.solve
+    monkeypatch.setattr(posture_fit.daqp, "solve", lambda *a, **k: (solve(*a, **k)[0] + 1e-6, 0.0, 1, {}))
+    layout = Layout([], [], np.zeros((0, 0)), np.zeros(0), np.zeros(0), [])
+    none = np.zeros((0, 3))
+    goals = Goals(none, np.zeros((0, 3, 3)), none, none, figure.neutral + 1.0, np.ones(1))
+    with wb.Scene(figure).borrow() as workspace:
+        q = Fitter(figure, layout, workspace).step(figure.neutral, goals, most=np.array([[-1 / 120], [1 / 120]]))
+    assert q[0] - figure.neutral[0] <= (1.0 + 1e-9) / 120
 
 
 TIP = np.array([0.5, 0.0, 0.0])

@@ -214,9 +214,9 @@ def test_the_thickness_of_a_part_whose_pieces_lie_beside_each_other() -> None:
 def test_the_floor_is_below_a_place_right_beside_a_table() -> None:
     scene = among(wb.load("hand"), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])))
     height = surface_of(scene)
-    assert height(np.array([0.0, 0.0, 1.6])) == pytest.approx(1.0 + 0.5 * SIZE[2], abs=1e-3)
-    assert height(np.array([0.5 * SIZE[0] + 2e-3, 0.0, 1.6])) == pytest.approx(0.0, abs=1e-3)
-    assert height(np.array([0.0, 0.0, 1.0])) is None  # inside of the table
+    assert height(np.array([0.0, 0.0, 1.6]), 0) == pytest.approx(1.0 + 0.5 * SIZE[2], abs=1e-3)
+    assert height(np.array([0.5 * SIZE[0] + 2e-3, 0.0, 1.6]), 0) == pytest.approx(0.0, abs=1e-3)
+    assert height(np.array([0.0, 0.0, 1.0]), 0) is None  # inside of the table
 
 
 def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsRecorder) -> None:

@@ -112,15 +112,13 @@ class Holds:
         dt: float,
         surface: Surface | None,
         touched: Touched | None = None,
-        span: float = SPAN,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
-        # `span` [s] is between the frames of the first pass and sweeps at most.
         # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
-        self._dt, self.span = dt, span
+        self._dt = dt
         contacts = () if touched is None else touched.contacts
         self.touches = bool(contacts)  # whether parts touch things, or each other
         # a part that touches a thing while it seems to rest on the ground rests on the thing
@@ -140,8 +138,7 @@ class Holds:
         self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
         self._places: dict[tuple[int, int], Array] = {}
         self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
-        # the same of all runs, with what is too short to be held between
-        self.given_up: set[tuple[int, int]] = set()
+        self._let_go: set[tuple[int, int]] = set()  # the same of all runs, with what is too short to be held between
 
     def lost(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> bool:
         """Whether points (h, 3) are too far from their things; then their goals and weights in `held` become zero."""
@@ -192,7 +189,7 @@ class Holds:
                     kept.append(stand)
                     continue
                 long = long_runs(reached, self.over)
-                self.given_up |= {(number, stand.first + frame) for frame in np.flatnonzero(~long).tolist()}
+                self._let_go |= {(number, stand.first + frame) for frame in np.flatnonzero(~long).tolist()}
                 own = self._places[number, stand.first]
                 for part in runs(long):
                     first = stand.first + part.first
@@ -215,7 +212,7 @@ class Holds:
                     continue
                 frames = range(contact.first, min(contact.end, len(q)))
                 gaps = np.array([touched.gap(contact, point, frame, q[frame], alone=True) for frame in frames])
-                gone = np.array([(number, frame) in self.given_up for frame in frames]) | (gaps > OUT_OF_REACH)
+                gone = np.array([(number, frame) in self._let_go for frame in frames]) | (gaps > OUT_OF_REACH)
                 if gone.any():
                     spans = [f"{contact.first + run.first} to {contact.first + run.end - 1}" for run in runs(gone)]
                     far = gaps[gone].max()
@@ -357,8 +354,9 @@ class Holds:
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))
-        # a new place keeps this share of the body's shift; the rest goes back with time
-        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.8 * shift
+        # a new place keeps a share of the body's shift, so that the rest goes back with time: with 0.8 a climber's feet
+        # fell half a metre behind its hands, which touch things where the recording does; with none a step may be long
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.3 * shift
         point = self.points[number]
         if point.edge:
             place[2] = self._height(number, place, stand, paths, frames)
@@ -389,7 +387,8 @@ class Holds:
         sole = next(own for own in self._soles if number in own)
         free = np.mean([paths[frame][sole] for frame in frames], axis=0)
         beside = place[:2] + free[:, :2] - free[sole.index(number), :2]
-        found = [self._surface(np.array([*at, level + STEP])) for at in (place[:2], *beside)]
+        middle = (stand.first + stand.end) // 2
+        found = [self._surface(np.array([*at, level + STEP]), middle) for at in (place[:2], *beside)]
         known = [below for below in found if below is not None]
         if not known:
             return CLEARANCE + level

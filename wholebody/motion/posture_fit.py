@@ -136,11 +136,6 @@ class Fitter:
         base = self._state.joints[self._bases]
         return np.asarray(np.einsum("hki,hi->hk", base[:, :3], self._places()[len(self.layout.points) :] - base[:, 3]))
 
-    def places(self, q: Array) -> Array:
-        """(p, 3) where the points are at a posture (nq,)."""
-        self._state.update(q)
-        return self._places()[: len(self.layout.points)]
-
     def outside(self, q: Array) -> bool:
         """Whether a posture (nq,) has a limb outside of its reach cone."""
         self._state.update(q)
@@ -220,7 +215,8 @@ class Fitter:
         )  # fmt: skip
         if flag <= 0:
             return q
-        return self.figure.clamp(np.asarray(pin.integrate(self.model, q, np.asarray(x))))
+        x = np.clip(x, lower, upper)  # daqp keeps bounds to 1e-6 alone, which is beyond the speed of a slow joint
+        return self.figure.clamp(np.asarray(pin.integrate(self.model, q, x)))
 
     def careful_step(self, q: Array, goals: Goals, most: Array | None, midway: Sequence[Midway] = ()) -> Array:
         """The posture (nq,) after a step; where it goes far and errors and overlaps grow, after a shorter one, or q.

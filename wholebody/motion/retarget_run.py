@@ -19,7 +19,7 @@ last sweeps have contact rows there too, and so have sweeps after them of the fr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -29,7 +29,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.faults import DIP
-from wholebody.motion.holds import Holds
+from wholebody.motion.holds import SPAN, Holds
 from wholebody.motion.posture_fit import CLEARANCE, LEAST_LEVER, Fitter, Goals, Midway, layout_of, levers
 from wholebody.motion.retarget_targets import Targets, Wanted, has_trunk, parts_of
 from wholebody.motion.roles import Roles
@@ -92,9 +92,8 @@ class Run:
         self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
         self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
-        self.span = 2 ** int(
-            max(0.0, np.log2((holds.span if holds else dt) / dt))
-        )  # frames between those of the first pass and first sweeps
+        # frames between those of the first pass and first sweeps
+        self.span = 2 ** int(max(0.0, np.log2((SPAN if holds else dt) / dt)))
         self.even, self.calm, self.spread = normal(EVEN, dt), normal(CALM, dt), normal(SPREAD, self.span * dt)
         # by frames: goals, free postures with their costs, those within speed limits, the free fit, where it has the
         # points that may be held, deviations of the first pass, what is held in sweeps, postures, deviations of the
@@ -190,13 +189,6 @@ class Run:
             for frame in range(given - KEPT, come - KEPT):
                 values.pop(frame, None)
         return found
-
-    def jerk(self, postures: Sequence[Array] | Array) -> float:
-        """Root mean square of the jerk of the points over postures (nq,), m/s³."""
-        if len(postures) < 4:
-            return 0.0
-        steps = np.diff(np.array([self.fitter.places(q) for q in postures]), 3, axis=0)
-        return float(((steps**2).sum(axis=2).mean()) ** 0.5 / self.dt**3)
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
         wanted = self._wanted[frame]

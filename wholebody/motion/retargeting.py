@@ -17,11 +17,11 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import PlacementLike
 from wholebody.geometry.shapes import HalfSpace
-from wholebody.motion.carrying import as_carried, at_start, brought_back, carrier
+from wholebody.motion.carrying import as_carried, brought_back, carrier
 from wholebody.motion.clip import Clip, thing_tracks
 from wholebody.motion.files.base import check_one
 from wholebody.motion.held_points import held_points, touching_points
-from wholebody.motion.holds import SPAN, Holds, Touched
+from wholebody.motion.holds import Holds, Touched
 from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
@@ -50,10 +50,6 @@ from wholebody.motion.thing_contacts import (
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
-# a clip whose points jerk so many times as those of the free fit, and so much [m/s³], or that overlaps so, is beyond
-# what it should be; so many times beyond, it is stuck at an edge, and is sought once more from frames so far apart [s].
-# Of both the one is kept with the least product of errors of bones and of how many times it is beyond
-JERKS, LEAST_JERK, STUCK, COARSE = 3.0, 50.0, 2.0, 4.0 * SPAN
 
 
 def retarget(
@@ -113,8 +109,7 @@ def retarget(
     if scene is not None and tracks and ground is not None and not isinstance(ground, Ground) and figure.root == "free":
         still_ground, joints = ground_on(motion, names, surface), skeleton_roles(motion, names)
         if on := carrier(motion, joints, scene, tracks, still_ground):
-            seen, others = as_carried(motion, scene, tracks, on)
-            there = at_start(scene, {on: tracks[on]})
+            seen, there, others = as_carried(motion, scene, tracks, on)
             rests = checked_ground(seen, figure, ground, names, surface_of(there, others))  # nobody is carried twice
             clip = retarget(seen, figure, there, rests, things=others, names=names, progress=progress)
             return brought_back(clip, tracks[on], tracks)
@@ -157,21 +152,11 @@ def retarget(
             parts = ((one.role, one.share, one.base) for one in contacts)
             points = held_points(figure, roles, held) + touching_points(figure, roles, motion, parts, joints)
             touched = Touched(figure, Things(world, tracks), contacts)
-            tries = list[tuple[float, Array, Array, Holds]]()
-            for span in (SPAN, COARSE):
-                holds = Holds(points, held, proportions.path, motion.dt, surface, touched, span)
-                run = partial(Run, figure, wanted, roles, motion.dt, holds, workspace, alone.free)
-                # places on things are sought as bodies come to them; a hand on the own body after a first pass
-                q = _held(run, holds, frames, all(one.base for one in contacts), progress)
-                depths = _depths(alone.fitter, holds, q)
-                most = max(JERKS * alone.jerk(alone.free), LEAST_JERK)
-                over = max(1.0, alone.jerk(q) / most, depths.max() / DEEP)
-                bones = list(errors_of(motion, Clip(figure, q, motion.dt), roles, found).values())
-                tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
-                if over < STUCK:
-                    break
-            held_on = len(tries[0][3].given_up)  # a second try that lets go of more is none
-            _, q, depths, holds = min((one for one in tries if len(one[3].given_up) <= held_on), key=lambda one: one[0])
+            holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
+            run = partial(Run, figure, wanted, roles, motion.dt, holds, workspace, alone.free)
+            # places on things are sought as bodies come to them; a hand on the own body after a first pass
+            q = _held(run, holds, frames, all(one.base for one in contacts), progress)
+            depths = _depths(alone.fitter, holds, q)
             lost = holds.let_go(q)
             inside = _said_inside(alone.fitter, holds, q, depths)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)

@@ -242,7 +242,7 @@ def ground_on(
             if role in joints and not (role.endswith("wrist") and role.replace("wrist", "hand") in joints):
                 rests[role], more = _others(motion, joints[role], role, holds, above)
                 if surface is not None:
-                    more = [each for each in more if not _hangs(each.place, min(above.values()), surface)]
+                    more = [each for each in more if not _hangs(each, min(above.values()), surface)]
                     _clear(rests, [*holds, *more])
                 holds = [*holds, *more]
     return Ground(tuple(sorted(holds, key=lambda each: each.first)), rests, above, levels, tilt, uneven, motion.dt)
@@ -257,10 +257,14 @@ def _clear(rests: dict[str, Mask], holds: list[Foothold]) -> None:
         rests[role] = mask & kept
 
 
-def _hangs(place: Array, floor: float, surface: Surface) -> bool:
-    """Whether a place (3,) is far above what is below it; `floor` is z = 0 of the scene in the recording's world."""
-    below = surface(place)
-    return below is not None and place[2] - floor - below > HANGS
+def _hangs(each: Foothold, floor: float, surface: Surface) -> bool:
+    """Whether a point is far above what is below it; `floor` is z = 0 of the scene in the recording's world."""
+    below = surface(each.place, _middle(each))
+    return below is not None and each.place[2] - floor - below > HANGS
+
+
+def _middle(each: Foothold) -> int:
+    return (each.first + each.end) // 2
 
 
 def _on_surfaces(
@@ -298,7 +302,7 @@ def _under(motion: SkeletonMotion, joints: Mapping[str, int], each: Foothold, su
     # a sole is looked at from its heel on, at shares of the way from ankle to toe
     places = [ways[0] + share * (ways[-1] - ways[0]) for share in (-0.4, 0.0, 0.5, 1.0, 1.4)] if len(ways) > 1 else ways
     top = max(place[2] for place in ways)
-    found = [surface(np.array([*place[:2], top])) for place in places]
+    found = [surface(np.array([*place[:2], top]), _middle(each)) for place in places]
     return [height for height in found if height is not None]
 
 

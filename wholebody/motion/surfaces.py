@@ -1,32 +1,48 @@
-"""Still surfaces of a scene, which feet stand on."""
+"""Surfaces of a scene that stand, which feet stand on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import TypeAlias
 
 import coal
 import numpy as np
+import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.scene.scene import Scene
 
-Surface: TypeAlias = Callable[[Array], float | None]  # height of the first surface below a place (3,), metres
+Surface: TypeAlias = Callable[[Array, int], float | None]
+"""Height of the first surface below a place (3,) in a frame, metres."""
 
 
-def surface_of(scene: Scene, moving: Collection[str] = ()) -> Surface:
-    """Height [m] of the first still surface up to 2 m below a place (3,); None for none, or in a thing."""
-    owners, geometry = scene.piece_owner, scene.geometry
-    still = [
-        (piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation))
-        for piece, owner in zip(geometry.geometryObjects, owners, strict=True)
-        if owner in scene.objects and scene.objects[owner].segment is None and owner not in moving
-    ]
+def stands(track: Array) -> Mask:
+    """(n,) when a thing with a track (n, 7) stands: from the frame before to that after it moves by less than 1 mm."""
+    after, before = np.vstack([track[1:], track[-1:]]), np.vstack([track[:1], track[:-1]])
+    return np.asarray(np.maximum(np.abs(after - track), np.abs(track - before)).max(axis=1) < 1e-3)
+
+
+def surface_of(scene: Scene, tracks: Mapping[str, Array] | None = None, without: Collection[str] = ()) -> Surface:
+    """Height [m] of the first surface up to 2 m below a place (3,) in a frame; None for none, or in a thing.
+
+    Things with `tracks` (n, 7) have surfaces while they stand, those `without` none.
+    """
+    still, moving = list[tuple[coal.CollisionGeometry, coal.Transform3s]](), {} if tracks is None else tracks
+    pieces, stood = scene.geometry.geometryObjects, {name: stands(track) for name, track in moving.items()}
+    for piece, owner in zip(pieces, scene.piece_owner, strict=True):
+        if owner in scene.objects and scene.objects[owner].segment is None and owner not in {*without, *moving}:
+            still.append((piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation)))
     ball, request = coal.Sphere(1e-6), coal.DistanceRequest()
 
-    def height(place: Array) -> float | None:
-        found = list[float]()
-        for shape, where in still:
+    def height(place: Array, frame: int) -> float | None:
+        found, here = list[float](), list(still)
+        for name, mask in stood.items():
+            if mask[frame]:
+                at = pin.XYZQUATToSE3(moving[name][frame])
+                for index, local in scene.built.pieces_of[name]:
+                    there = at * local
+                    here.append((pieces[index].geometry, coal.Transform3s(there.rotation, there.translation)))
+        for shape, where in here:
             at = np.array(place)
             while at[2] > place[2] - 2.0:
                 result = coal.DistanceResult()
