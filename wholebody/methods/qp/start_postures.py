@@ -39,16 +39,17 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 def before_contact(
     problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
 ) -> Iterator[LocalSolution]:
-    """Descents to surfaces in front of what they are to touch or, with `grips`, to bars in front of palms too."""
+    """Descents to surfaces in front of what they touch; with `grips`, where fingers grip, also to bars in front of palms."""
     terms, start = (*problem.goals, *problem.constraints), problem.scene.figure.clamp(problem.start)
     state = shared.lineariser.state.update(start)
     faces, bars = any(_at_no_face(term, state) for term in terms), any(takes_bar(term) for term in terms)
-    if grips and (faces or not bars):
+    fingers = any(isinstance(part, Opposing) for term in terms for part in getattr(term, "parts", ()))
+    if grips and (not bars or (faces and not fingers)):
         return
 
     def in_front(given: Sequence[Any]) -> list[Any]:
         beside = [on_its_side(term, problem.scene, state, IN_FRONT) for term in given]
-        return [opened(term, IN_FRONT) if grips else approached(term, IN_FRONT) for term in beside]
+        return [approached(opened(term, IN_FRONT) if grips else term, IN_FRONT) for term in beside]
 
     goals, constraints = in_front(problem.goals), in_front(problem.constraints)
     sides = any(isinstance(a, Touch) and a is not b for a, b in zip((*goals, *constraints), terms, strict=True))
