@@ -39,7 +39,7 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 def before_contact(
     problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False
 ) -> Iterator[LocalSolution]:
-    """Descents to surfaces in front of what they touch; with `grips`, where fingers grip, also to bars in front of palms."""
+    """Descents to surfaces in front of what they are to touch or, with `grips`, to bars in front of palms too."""
     terms, start = (*problem.goals, *problem.constraints), problem.scene.figure.clamp(problem.start)
     state = shared.lineariser.state.update(start)
     faces, bars = any(_at_no_face(term, state) for term in terms), any(takes_bar(term) for term in terms)
