@@ -26,6 +26,24 @@ def test_contacts_are_met_from_an_end_in_front_of_all_faces() -> None:
     assert solution.solved, solution
 
 
+def test_fingers_close_around_rungs_while_feet_are_on_others() -> None:
+    """Soles alone were led in front of their rungs, with hands closed: 1,200 programs ended 2 cm off."""
+    scene = wb.Scene(wb.load("human", hands="fingers"))
+    for number in range(8):
+        height = 0.28 * (number + 1)
+        at = (0.35 + 0.25 * height, 0.0, height, 0.5**0.5, 0.0, 0.0, 0.5**0.5)
+        scene.add(wb.Cylinder(0.015, 0.45), name=f"rung{number}", at=at)
+    hands = [wb.Grasp(side, "rung5", kind="power") for side in ("left", "right")]
+    feet = [wb.Stand(f"rung{k}", feet=[f"{side}_foot"], balance=False) for k, side in enumerate(("left", "right"))]
+    problem = wb.Problem(scene, "standing", goals=hands, constraints=feet)
+    solution = wb.solve(problem, wb.methods.QP(measures=False, time_limit=30.0))
+    assert solution.solved, solution
+    assert solution.iterations < 500
+    for side in ("left", "right"):  # the rung, at 0.77 m ahead and 1.68 m up, is in the hand
+        palm = scene.figure.placement(solution.q, f"{side}_palm").translation
+        assert np.hypot(palm[0] - 0.77, palm[2] - 1.68) < 0.05
+
+
 def test_a_descent_that_spent_its_programs_beside_the_contact_goes_on() -> None:
     """A woman's hands were 0.05 mm from the wheel after 150 programs, and 900 others went into other starts."""
     method = wb.methods.QP(measures=False, time_limit=30.0, iterations=3)  # from before contact it takes four

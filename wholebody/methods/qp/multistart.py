@@ -101,8 +101,8 @@ class QPMultistart(Search):
         """Those in which measures do not count."""
         start, least, tried = self._start, self._least, self.tried
         self._first = len(self.trace)
-        yield Attempt(self._before_contact(), self._into_contact, "from before contact")
         yield Attempt(self._before_contact(grips=True), self._gripping, "from before a grip")
+        yield Attempt(self._before_contact(), self._into_contact, "from before contact")
         yield Attempt([start], self._closing, "by feasibility first")
         self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
         self.out_of_reach = self._seems_out_of_reach(self.best.q)

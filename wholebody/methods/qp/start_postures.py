@@ -43,12 +43,13 @@ def before_contact(
     terms, start = (*problem.goals, *problem.constraints), problem.scene.figure.clamp(problem.start)
     state = shared.lineariser.state.update(start)
     faces, bars = any(_at_no_face(term, state) for term in terms), any(takes_bar(term) for term in terms)
-    if grips and (faces or not bars):
+    fingers = any(isinstance(part, Opposing) for term in terms for part in getattr(term, "parts", ()))
+    if grips and (not bars or (faces and not fingers)):
         return
 
     def in_front(given: Sequence[Any]) -> list[Any]:
         beside = [on_its_side(term, problem.scene, state, IN_FRONT) for term in given]
-        return [opened(term, IN_FRONT) if grips else approached(term, IN_FRONT) for term in beside]
+        return [approached(opened(term, IN_FRONT) if grips else term, IN_FRONT) for term in beside]
 
     goals, constraints = in_front(problem.goals), in_front(problem.constraints)
     sides = any(isinstance(a, Touch) and a is not b for a, b in zip((*goals, *constraints), terms, strict=True))
