@@ -70,6 +70,7 @@ class FigureBodies:
         self.step: tuple[Array, Array, Array] | None = None
         self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state_of: Array | None = None
+        self._made: tuple[Array, Array] = np.zeros(0), self._start
         self.chart = Chart(self.model, first)
 
     def index(self, joint: int) -> int:
@@ -89,9 +90,14 @@ class FigureBodies:
     def state_at(self, x: Array) -> State:
         """The kinematic state at the bodies x (count + 1, 7)."""
         if self._state_of is not x:
-            self._present.update(self._posture(x))
+            self._present.update(self.posture_at(x))
             self._state_of = x
         return self._present
+
+    def posture_at(self, x: Array) -> Array:
+        """The posture (nq,), within limits, at all bodies x (n + 1, 7); that of the last `variables` is known."""
+        made, q = self._made
+        return q if np.array_equal(x[self.first : self.first + self.count], made) else self._posture(x)
 
     def state_of(self, q: Array) -> State:
         """The same at the posture q (nq,)."""
@@ -100,7 +106,7 @@ class FigureBodies:
 
     def displacement(self) -> DisplacementRows:
         """One row for each degree of freedom: the figure's displacement from a posture."""
-        return DisplacementRows(self.model, self.chart, self._posture)
+        return DisplacementRows(self.model, self.chart, self.posture_at)
 
     def choose_limits(self) -> None:
         """Set the rows of `limits` to the limits that are nearer at the last posture."""
@@ -131,7 +137,8 @@ class FigureBodies:
         bodies = np.empty((self.count, 7))
         bodies[:, :3] = places[1:, 3]
         bodies[:, 3:] = quaternions(places[1:, :3].transpose(0, 2, 1))
-        result: Array = bodies.ravel()
+        self._made = bodies, q
+        result: Array = bodies.flatten()  # a copy
         return result
 
     def posture(self, x: Array) -> Array:
