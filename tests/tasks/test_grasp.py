@@ -261,3 +261,17 @@ def test_a_crate_that_no_hand_spans_is_not_grasped():
     scene.add(wb.Box((0.3, 0.3, 0.3)), name="crate", at=(0.45, -0.25, 1.1))
     problem = wb.Problem(scene, goals=[wb.Grasp("right", "crate", "pinch")])
     assert not wb.solve(problem, wb.methods.QP(restarts=1, budget=80)).solved
+
+
+def test_somebody_kneels_to_take_the_handle_of_a_drawer() -> None:
+    """Fingers close from in front of the bar once the knee is at the floor; a rigid hand shows that it is in reach."""
+    solved = []
+    for hands in ("rigid", "fingers"):
+        scene = wb.Scene(wb.load("human", sex="female", percentile=25, hands=hands)).add(wb.HalfSpace(), name="floor")
+        scene.add(wb.Box((0.5, 0.6, 0.9)), name="chest", at=(0.85, 0.0, 0.45))
+        lying = pin.SE3ToXYZQUAT(pin.SE3(pin.utils.rotate("x", 0.5 * np.pi), np.array((0.55, 0.0, 0.5))))
+        scene.add(wb.Cylinder(0.006, 0.12), name="handle", at=lying)
+        knees = wb.Stand(on="floor", feet=["right_foot", "left_shank"], knees=["left_shank"])
+        grip = wb.Grasp("right", "handle", kind="power")
+        solved.append(wb.solve(wb.Problem(scene, goals=[grip], constraints=[knees])))
+    assert [each.status for each in solved] == ["solved", "solved"], solved[1].message

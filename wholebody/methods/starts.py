@@ -19,6 +19,7 @@ from wholebody.tasks.bounds import allowed
 from wholebody.tasks.checks import is_a
 from wholebody.tasks.contact_parts import Over
 from wholebody.tasks.defaults import UPRIGHT
+from wholebody.tasks.distance import Effort
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.inputs import body_of
 from wholebody.tasks.sit import Sit
@@ -114,6 +115,12 @@ def halfway(problem: Problem, state: State, start: Array) -> Array:
     """The start (nq,) half way to the middle of every joint's range: stretched limbs are bent. It moves the state."""
     lower, upper = _ranges(problem, start)
     return _moved(problem, state, start, 0.25 * (lower + upper))
+
+
+def least_effort(problem: Problem) -> list[Array]:
+    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels."""
+    start, measures = problem.scene.figure.clamp(problem.start), problem.measures
+    return [q for each in measures if type(each) is Effort and ((q := each.distance.reference) != start).any()]
 
 
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:

@@ -21,10 +21,19 @@ from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
-from wholebody.methods.starts import Attempt, Minima, alike, crouched, hooked_hands, restarts, seated, throughout
+from wholebody.methods.starts import (
+    Attempt,
+    Minima,
+    alike,
+    crouched,
+    hooked_hands,
+    least_effort,
+    restarts,
+    seated,
+    throughout,
+)
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks.distance import Effort
 
 
 class QPMultistart(Search):
@@ -73,8 +82,7 @@ class QPMultistart(Search):
             there = self._nearer(seated(self.problem, self.lineariser.state, self._start, ahead))
             yield Attempt(there, self.directly, "from the seat")
         yield Attempt(begin or [self._start], self.directly, "directly")
-        rests = (term.distance.reference for term in self.problem.measures if type(term) is Effort)
-        yield Attempt((q for q in rests if (q != self._start).any()), self.directly, "from the posture of least effort")
+        yield Attempt(least_effort(self.problem), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return

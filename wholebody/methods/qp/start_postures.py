@@ -19,7 +19,7 @@ from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.iterates import LocalSolution, Run
 from wholebody.methods.qp.settings import SEARCH
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.starts import alike, halfway, restarts
+from wholebody.methods.starts import alike, halfway, least_effort, restarts
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Goal, filled
@@ -74,7 +74,7 @@ def before_contact(
     count = 3 if grips else 24
     others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
-    for q in chain([start], [halfway(problem, state, start)] if sides else [], others):
+    for q in chain(least_effort(problem), [start], [halfway(problem, state, start)] if sides else [], others):
         local = led(q)
         # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
         if local.violation.worst <= 0.01:
