@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.motion.test_ground import DT, flat, walker
 from tests.motion.test_retargeting import angles, person, places
+from wholebody.motion import retargeting
 from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.thing_contacts import own_rests
 
@@ -162,3 +164,22 @@ def test_a_skeleton_of_places_alone_faces_where_its_hips_do(human: wb.Figure) ->
     assert away.max() < 15.0
     chest = np.array([human.placement(q, "thorax").rotation for q in clip.q])  # turns with the hips, not against them
     assert angles(chest[:, :, 1], turns[:, :, 1]).max() < 15.0
+
+
+def test_a_clip_that_is_stuck_is_sought_again_with_feet_that_lag_more(
+    human: wb.Figure, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, _ = walker(flat, 1.0)
+    usual, measured, calls = wb.retarget(motion, human), retargeting._depths, list[float]()
+
+    def depths(*given: Any) -> np.ndarray:
+        calls.append(0.0)
+        return measured(*given) + (0.01 if len(calls) == 1 else 0.0)  # as if the first one overlapped by 10 mm
+
+    with monkeypatch.context() as patched:
+        patched.setattr(retargeting, "_depths", depths)
+        again = wb.retarget(motion, human)
+    monkeypatch.setattr(retargeting, "LAG", retargeting.AGAIN)
+    assert len(calls) == 2
+    assert np.array_equal(again.q, wb.retarget(motion, human).q)
+    assert not np.array_equal(again.q, usual.q)

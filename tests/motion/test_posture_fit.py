@@ -39,7 +39,7 @@ def test_a_short_lever_does_not_turn_past_a_place_that_it_cannot_reach(tmp_path:
 def test_a_step_keeps_to_its_bounds_where_the_solver_keeps_to_them_to_rounding(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """daqp may be 1e-6 beyond bounds: a joint of 1 rad/s was 1e-4 of its speed limit too fast at 120 frames a second."""
+    """A solver may be 1e-6 beyond bounds: a joint of 1 rad/s was 1e-4 of its limit too fast at 120 frames a second."""
     (path := tmp_path / "wrist.urdf").write_text(WRIST)
     figure, solve = wb.load(path), posture_fit.daqp.solve
     monkeypatch.setattr(posture_fit.daqp, "solve", lambda *a, **k: (solve(*a, **k)[0] + 1e-6, 0.0, 1, {}))

@@ -35,6 +35,7 @@ BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
+LAG = 0.3  # of 1: more lets a climber's feet fall far behind its hands, which touch what the recorded ones do
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
 
@@ -112,13 +113,15 @@ class Holds:
         dt: float,
         surface: Surface | None,
         touched: Touched | None = None,
+        lag: float = LAG,
     ) -> None:
         """Take the points that rest at some time, the ground that says when, and what is touched."""
+        # `lag` is the share of the body's shift from the free fit that a new place has.
         # `scale` are metres of the figure for each metre of height of the recording's ground; `surface` is the height
         # of the highest surface below a place (3,), None for the recording's ground.
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
-        self._dt = dt
+        self._dt, self._lag = dt, lag
         contacts = () if touched is None else touched.contacts
         self.touches = bool(contacts)  # whether parts touch things, or each other
         # a part that touches a thing while it seems to rest on the ground rests on the thing
@@ -354,9 +357,8 @@ class Holds:
         if known is not None:
             return known
         frames = range(stand.first, min(stand.end, stand.first + self.over))
-        # a new place keeps a share of the body's shift, so that the rest goes back with time: with 0.8 a climber's feet
-        # fell half a metre behind its hands, which touch things where the recording does; with none a step may be long
-        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + 0.3 * shift
+        # a new place keeps a share of the body's shift; the rest goes back with time
+        place: Array = np.mean([paths[frame][number] for frame in frames], axis=0) + self._lag * shift
         point = self.points[number]
         if point.edge:
             place[2] = self._height(number, place, stand, paths, frames)

@@ -136,6 +136,11 @@ class Fitter:
         base = self._state.joints[self._bases]
         return np.asarray(np.einsum("hki,hi->hk", base[:, :3], self._places()[len(self.layout.points) :] - base[:, 3]))
 
+    def places(self, q: Array) -> Array:
+        """(p, 3) where the points are at a posture (nq,)."""
+        self._state.update(q)
+        return self._places()[: len(self.layout.points)]
+
     def outside(self, q: Array) -> bool:
         """Whether a posture (nq,) has a limb outside of its reach cone."""
         self._state.update(q)

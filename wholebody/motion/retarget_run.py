@@ -19,7 +19,7 @@ last sweeps have contact rows there too, and so have sweeps after them of the fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -189,6 +189,13 @@ class Run:
             for frame in range(given - KEPT, come - KEPT):
                 values.pop(frame, None)
         return found
+
+    def jerk(self, postures: Sequence[Array] | Array) -> float:
+        """Root mean square of the jerk of the points over postures (nq,), m/s³."""
+        if len(postures) < 4:
+            return 0.0
+        steps = np.diff(np.array([self.fitter.places(q) for q in postures]), 3, axis=0)
+        return float(((steps**2).sum(axis=2).mean()) ** 0.5 / self.dt**3)
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
         wanted = self._wanted[frame]

@@ -21,7 +21,7 @@ from wholebody.motion.carrying import as_carried, brought_back, carrier
 from wholebody.motion.clip import Clip, thing_tracks
 from wholebody.motion.files.base import check_one
 from wholebody.motion.held_points import held_points, touching_points
-from wholebody.motion.holds import Holds, Touched
+from wholebody.motion.holds import LAG, Holds, Touched
 from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
@@ -50,6 +50,10 @@ from wholebody.motion.thing_contacts import (
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
+# a clip whose points jerk so many times as those of the free fit, and so much [m/s³], or that overlaps so, is beyond
+# what it should be; so many times beyond, it is stuck at an edge, and is sought once more with feet that lag so much.
+# Of both the one is kept with the least product of errors of bones and of how many times it is beyond
+JERKS, LEAST_JERK, STUCK, AGAIN = 3.0, 50.0, 2.0, 0.8
 
 
 def retarget(
@@ -152,11 +156,20 @@ def retarget(
             parts = ((one.role, one.share, one.base) for one in contacts)
             points = held_points(figure, roles, held) + touching_points(figure, roles, motion, parts, joints)
             touched = Touched(figure, Things(world, tracks), contacts)
-            holds = Holds(points, held, proportions.path, motion.dt, surface, touched)
-            run = partial(Run, figure, wanted, roles, motion.dt, holds, workspace, alone.free)
-            # places on things are sought as bodies come to them; a hand on the own body after a first pass
-            q = _held(run, holds, frames, all(one.base for one in contacts), progress)
-            depths = _depths(alone.fitter, holds, q)
+            tries = list[tuple[float, Array, Array, Holds]]()
+            for lag in (LAG, AGAIN):
+                holds = Holds(points, held, proportions.path, motion.dt, surface, touched, lag)
+                run = partial(Run, figure, wanted, roles, motion.dt, holds, workspace, alone.free)
+                # places on things are sought as bodies come to them; a hand on the own body after a first pass
+                q = _held(run, holds, frames, all(one.base for one in contacts), progress)
+                depths = _depths(alone.fitter, holds, q)
+                most = max(JERKS * alone.jerk(alone.free), LEAST_JERK)
+                over = max(1.0, alone.jerk(q) / most, depths.max() / DEEP)
+                bones = list(errors_of(motion, Clip(figure, q, motion.dt), roles, found).values())
+                tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
+                if over < STUCK:
+                    break
+            _, q, depths, holds = min(tries, key=lambda one: one[0])
             lost = holds.let_go(q)
             inside = _said_inside(alone.fitter, holds, q, depths)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
