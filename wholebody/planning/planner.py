@@ -25,12 +25,12 @@ from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
 from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
 from wholebody.planning.ends import answers
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.search import Search
 from wholebody.planning.smoothing import length, refined, resampled, smooth
 from wholebody.planning.tightening import tighten
 from wholebody.planning.timing import Pace, Timing, used
+from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal
@@ -138,7 +138,7 @@ def plan(
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
-            tracked = holds(problem) or bool(problem.bounds or scene.figure.followers)
+            tracked = not holds(problem) and bool(problem.bounds or scene.figure.followers)
             slides = TrackedMotions(problem, workspace)
             local: LocalPlanner = slides if tracked else slides.geodesics
             search = Search(problem, judge.in_time, (local, slides), ends, (sampler, rng))
@@ -206,13 +206,13 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     with judge.in_time(path):
         even, _ = local.settled(refined(model, path, count))
         smoothed = smooth(model, even, local)
-    found = judge.judged([smoothed])
+    found = judge.judged([smoothed], local)
     judge.took = left - BUDGET.left
     if not (found.solved or BUDGET.over):
-        found = judge.judged([even])
+        found = judge.judged([even], local)
     if not (found.solved or BUDGET.over):
         # 12 postures of each straight part; more: sooner at the end, dearer
-        found = judge.judged([local.settled(resampled(model, pair, 12))[0] for pair in pairwise(path)])
+        found = judge.judged([local.settled(resampled(model, pair, 12))[0] for pair in pairwise(path)], local)
     return found
 
 
@@ -253,11 +253,11 @@ class _Judge:
         # shortcuts through a long path make it shorter, so that they have some time in any case
         return within_budget(max(left - judging, 0.2 * left, 1e-9))
 
-    def judged(self, parts: Sequence[Array]) -> Plan:
+    def judged(self, parts: Sequence[Array], local: LocalPlanner) -> Plan:
         """The motion along parts (m, nq) of a path as fast as the limits allow, each from rest to rest; its figures."""
         scene, pace = self.problem.scene, self._pace
         # the last posture of a part is the first of the next one: a step of rest, in which no acceleration adds up
-        q = np.concatenate([Timing(scene.figure, part, pace).within() for part in parts])
+        q = np.concatenate([Timing(scene.figure, part, pace, local.corrected).within() for part in parts])
         use = used(scene.figure, q, pace)
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
         for frame in q:  # as far as the first that misses something

@@ -12,11 +12,12 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.ends import End, nearer
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+from wholebody.planning.local_planner import Geodesics
 from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import length, shortcut
 from wholebody.planning.tightening import tighten
+from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
@@ -87,7 +88,7 @@ class Search:
         """Paths drawn tight: the shortest one again and again, and where that is tight the next, as time lets them."""
         model, found = self._problem.scene.model, list[list[Array]]()
         waiting = sorted(paths, key=lambda path: length(model, path))
-        while waiting and self._local is not self._slides and BUDGET.spent < POLISHED:
+        while waiting and not holds(self._problem) and self._local is not self._slides and BUDGET.spent < POLISHED:
             path = waiting.pop(0)
             with self._in_time(path):
                 left = BUDGET.left
@@ -116,7 +117,7 @@ class Search:
         """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
-        sliding = self._problem.scene.figure.roots and self._local is not self._slides
+        sliding = self._problem.scene.figure.roots and type(self._local) is Geodesics
         trees = RRTConnect(
             self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
         )
@@ -170,6 +171,8 @@ class Search:
         way, self._straight = self._local.towards(start, end)
         if self._straight:
             return [start, *way[:-1], end]
+        if holds(self._problem):
+            return []
         way, met = self._slides.towards(end, start)
         return [start, *way[-2::-1], end] if met else []
 

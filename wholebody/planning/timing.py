@@ -7,6 +7,7 @@ pass accelerates as much as these let it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -56,8 +57,8 @@ class Pace(Checked):
 class Timing:
     """When the places of a path are passed: a cubic spline through postures (m, nq), from rest to rest."""
 
-    def __init__(self, figure: Figure, path: Array, pace: Pace) -> None:
-        self._figure, self._path, self._pace = figure, path, pace
+    def __init__(self, figure: Figure, path: Array, pace: Pace, corrected: Callable[[Array], Array]) -> None:
+        self._figure, self._path, self._pace, self._corrected = figure, path, pace, corrected
         knots = np.arange(len(path))
         self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))
         limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
@@ -67,7 +68,8 @@ class Timing:
         """Postures (frames, nq), `pace.dt` apart, all of it so many times as slow as the limits let it be."""
         model, path = self._figure.model, self._path
         between = self._spline(passed(self._b, self._pace.dt / slower)[0])[1:-1]
-        found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
+        placed = (self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between)
+        found = [self._corrected(q) for q in placed]
         return np.array([path[0], *found, path[-1]])
 
     def within(self) -> Array:
