@@ -49,6 +49,7 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
     "wholebody.planning.multiplier_kernel",
+    "wholebody.planning.projection_kernel",
 )
 
 

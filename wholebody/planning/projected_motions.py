@@ -1,7 +1,7 @@
 """Motions of figures that hold something: steps of geodesics, each projected onto what is held (CBiRRT).
 
-A projection solves ``c(q) = 0`` for what is held and for other constraints that a posture misses, by Newton's method with
-the pseudo-inverse of their Jacobian J,
+A projection solves ``c(q) = 0`` for what is held and for other constraints that a posture misses, by Newton's method
+with the pseudo-inverse of their Jacobian J,
 
     dq = -J' (J J' + d I)^-1 c(q),   within joint limits,
 
@@ -19,12 +19,11 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.control import BUDGET
 from wholebody.planning.local_planner import Geodesics, Kept
+from wholebody.planning.projection_kernel import displace
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.terms.linearisation import PackedLinearisation
 
-STEP = 0.08  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
-DAMPING = 1e-7  # m^2 and rad^2 of a projection; larger = more iterations, smaller = far off where rows are dependent
+STEP = 0.05  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
 ITERATIONS = 8  # of a projection, which takes two or three from a step
 
 
@@ -34,7 +33,7 @@ class ProjectedMotions(Geodesics):
     searches: ClassVar[int] = 4
     samples: ClassVar[int] = 200
     rounds: ClassVar[int] = 50
-    tries: ClassVar[int] = 20
+    tries: ClassVar[int] = 25
     spacing: ClassVar[float] = 0.04
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
@@ -48,6 +47,8 @@ class ProjectedMotions(Geodesics):
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
+        self._never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(self._bounds)
+        self._away = np.zeros(self._model.nv)
         # what is held is missed between two postures by the square of a step; others have room as of their postures
         self._followed = Kept(
             np.where(self._equal, np.array([[-np.inf], [np.inf]]), self._bounds), self._followed.room
@@ -61,26 +62,22 @@ class ProjectedMotions(Geodesics):
     def corrected(self, q: Array) -> Array:
         """See `Geodesics`: the same two iterations for each posture, so that a smooth motion stays so."""
         for _ in range(2):
-            at = self._lineariser.packed(q, -1.0)  # no pairs
-            q = self._displaced(q, at, self._equal, at.value - self._bounds[0])
+            q, _ = self._displaced(q, self._never, self._bounds)
         return q
 
     def _projected(self, q: Array) -> Array | None:
-        low, high = self._kept.sides
+        aims = np.where(self._equal, self._bounds, self._kept.sides)
         for _ in range(ITERATIONS):
-            at = self._lineariser.packed(q, -1.0)  # no pairs
-            value, box = at.value, at.box
-            kept = np.minimum(np.maximum(value, low), high)
-            out = value != kept
-            if not (out.any() or (box[0] > 0.0).any() or (box[1] < 0.0).any()):
+            q, missed = self._displaced(q, self._kept.sides, aims)
+            if not missed:
                 return q
-            q = self._displaced(q, at, self._equal | out, value - np.where(self._equal, self._bounds[0], kept))
         return None
 
-    def _displaced(self, q: Array, at: PackedLinearisation, rows: Mask, missed: Array) -> Array:
-        """The posture (nq,) of the least displacement that makes up for what some rows (c,) miss."""
-        away = _least(at.jacobian[: len(rows)][rows], missed[rows], at.box)
-        return np.asarray(pin.integrate(self._model, q, away))
+    def _displaced(self, q: Array, sides: Array, aims: Array) -> tuple[Array, bool]:
+        """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""
+        at, away = self._lineariser.packed(q, -1.0), self._away  # no pairs
+        needed = displace(at.jacobian, at.value, sides, aims, at.box, away)
+        return (np.asarray(pin.integrate(self._model, q, away)), True) if needed else (q, False)
 
     def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
         """See `Geodesics`; it does not get to a target that misses what is held."""
@@ -126,11 +123,11 @@ class ProjectedMotions(Geodesics):
     def settled(self, path: Array) -> tuple[Array, Mask]:
         """See `Geodesics`."""
         found, blocked = path.copy(), np.ones(len(path) - 1, dtype=bool)
-        found[1:-1] = [self.projected(q) for q in path[1:-1]]
-        for k, pair in enumerate(pairwise(found)):
+        for k, q in enumerate(path[1:], start=1):
             if BUDGET.over:
                 break
-            blocked[k] = not self._leads(*pair)
+            found[k] = self.projected(q) if k < len(path) - 1 else q
+            blocked[k - 1] = not self._leads(found[k - 1], found[k])
         steps, usual = (
             np.array([np.linalg.norm(pin.difference(self._model, *pair)) for pair in pairwise(each)])
             for each in (found, path)
@@ -140,19 +137,3 @@ class ProjectedMotions(Geodesics):
     def follows(self, q: Array, there: Array) -> bool:
         """See `Geodesics`."""
         return self._leads(q, there)
-
-
-def _least(rows: Array, missed: Array, box: Array) -> Array:
-    """The least displacement (nv,) within a box (2, nv) that makes up for what rows (r, nv) miss, (r,)."""
-    found = np.minimum(np.maximum(0.0, box[0]), box[1])
-    free = box[0] < box[1]
-    for _ in range(3):  # joints that end at their limits leave the rest to others
-        mine = rows[:, free]
-        given = missed + rows[:, ~free] @ found[~free]
-        found[free] = -mine.T @ np.linalg.solve(mine @ mine.T + DAMPING * np.eye(len(rows)), given)
-        out = (found < box[0]) | (found > box[1])
-        found = np.minimum(np.maximum(found, box[0]), box[1])
-        if not out.any():
-            break
-        free &= ~out
-    return found

@@ -48,7 +48,9 @@ class Search:
         self._bodily = free_root and self._local is not self._slides
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
-        self._straight, self._until = False, AGAIN
+        self._held = holds(problem)
+        self._again = 0.15 if self._held else AGAIN
+        self._straight, self._until = False, self._again
 
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
@@ -63,9 +65,14 @@ class Search:
                 break
             if self._straight and self._proven(path):
                 return path, "the straight motion"
+            before = np.inf
+            # a shorter path is judged sooner, which leaves time for other shortcuts; half of it is for smoothing
+            while length(model, path) < 0.9 * before and (before == np.inf or BUDGET.spent < POLISHED):
+                before = length(model, path)
+                with self._in_time(path), within_budget(BUDGET.left * (0.5 if self._held else 1.0)):
+                    # limbs that move evenly cost as much as five other shortcuts
+                    path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
             with self._in_time(path):
-                # limbs that move evenly cost as much as five other shortcuts
-                path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
                 path = nearer(self._problem, path, self._local, self._sampler)
             paths.append(path)
             if (found := length(model, path)) < most:
@@ -73,8 +80,8 @@ class Search:
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
-            long = self._local is not self._slides and not self._bodily and most > LONG * straight
-            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
+            long = not (self._local is self._slides or self._bodily or self._held) and most > LONG * straight
+            self._until, enough = (LATER, np.inf) if long else (self._again, self._local.samples)
         ready = sorted([*self._polished(paths), *paths], key=lambda path: length(model, path))
         best = next((path for path in ready if self._proven(path)), None)
         if best is not None:

@@ -68,20 +68,22 @@ class Timing:
         """Postures (frames, nq), `pace.dt` apart, all of it so many times as slow as the limits let it be."""
         model, path = self._figure.model, self._path
         between = self._spline(passed(self._b, self._pace.dt / slower)[0])[1:-1]
-        placed = (self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between)
-        found = [self._corrected(q) for q in placed]
+        found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 
     def within(self) -> Array:
-        """The frames of the fastest timing whose differences keep the limits."""
-        slower = 1.0
-        for _ in range(10):  # a motion whose derivatives keep the limits is slowed until its frames do
+        """The frames of the fastest timing whose differences keep the limits, each on what is held."""
+        slower, exact = 1.0, False
+        for _ in range(12):  # a motion whose derivatives keep the limits is slowed until its frames do
             q = self.frames(slower)
+            if exact:
+                q[1:-1] = [self._corrected(frame) for frame in q[1:-1]]
             use = used(self._figure, q, self._pace)
             over = max(use.velocity, np.sqrt(use.acceleration))
-            if over <= 1.0:
+            if over <= 1.0 and exact:
                 break
-            slower *= 1.001 * over
+            exact = exact or over <= 1.0
+            slower *= 1.001 * max(over, 1.0)
         return q
 
 
