@@ -1,9 +1,8 @@
 """Local planners: motions from one posture towards another that are free of collision throughout.
 
 Without constraints a motion is a geodesic. It advances by as much as no pair can lose its distance (conservative
-advancement, Mirtich 1996). With constraints a motion consists of steps of the QP tracker towards the posture. Each step
-keeps the constraints, the limits and the distances, so the motion slides along what is in the way, and stays on what is
-held (as projections do, Berenson and others 2011).
+advancement, Mirtich 1996). Where something is held, steps of it are projected (`projected_motions`). With other
+constraints a motion consists of steps of the QP tracker, which slide along what is in the way (`tracked_motions`).
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import largest_approach, pair_kinds
 from wholebody.geometry.continuous.moved_pairs import kept_apart
 from wholebody.methods.control import BUDGET
-from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import ConstraintValues
@@ -69,10 +67,7 @@ class Geodesics:
         each = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         sides, inwards = np.hstack([np.zeros((2, 0)), *each]), np.array([[1.0], [-1.0]])
         self._kept = Kept(sides + INSIDE * inwards, np.full(len(self._least), MARGIN))
-        # what is held is missed between two steps, and settled there
-        self._followed = Kept(
-            sides - (INSIDE if holds(problem) else MISSED) * inwards, np.full(len(self._least), 0.5 * MARGIN)
-        )
+        self._followed = Kept(sides - MISSED * inwards, np.full(len(self._least), 0.5 * MARGIN))
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
         if len(unbounded):
             names = [workspace.owners[piece] for piece in pairs[unbounded[0]]]

@@ -50,9 +50,7 @@ class ProjectedMotions(Geodesics):
         self._never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(self._bounds)
         self._away = np.zeros(self._model.nv)
         # what is held is missed between two postures by the square of a step; others have room as of their postures
-        self._followed = Kept(
-            np.where(self._equal, np.array([[-np.inf], [np.inf]]), self._bounds), self._followed.room
-        )
+        self._followed = Kept(np.where(self._equal, np.array([[-np.inf], [np.inf]]), self._bounds), self._followed.room)
 
     def projected(self, q: Array) -> Array:
         """The posture (nq,) near q that meets what is held; q itself where none is found."""

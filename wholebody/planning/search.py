@@ -21,6 +21,7 @@ from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
+HELD_AGAIN = 0.15  # the same where something is held, as a second search of a body takes as long as the first
 AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
@@ -34,7 +35,7 @@ class Search:
     def __init__(
         self,
         problem: Problem,
-        in_time: Callable[[list[Array]], AbstractContextManager[None]],
+        in_time: Callable[..., AbstractContextManager[None]],
         planners: tuple[LocalPlanner, TrackedMotions],
         ends: Iterator[End],
         random: tuple[Sampler, np.random.Generator],
@@ -44,12 +45,14 @@ class Search:
         self._sampler, self._rng = random
         self._reached: list[Array] = []
         self._said = ""
-        free_root = bool(problem.scene.figure.roots) and not holds(problem)
+        self._held = holds(problem)
+        free_root = bool(problem.scene.figure.roots) and not self._held
         self._bodily = free_root and self._local is not self._slides
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
-        self._held = holds(problem)
-        self._again = 0.15 if self._held else AGAIN
+        # programs of a body that holds something have thousands of rows
+        self._tightens = self._local is not self._slides and not (self._held and problem.scene.figure.roots)
+        self._again = HELD_AGAIN if self._held else AGAIN
         self._straight, self._until = False, self._again
 
     def shortest(self) -> tuple[list[Array] | None, str]:
@@ -67,9 +70,9 @@ class Search:
                 return path, "the straight motion"
             before = np.inf
             # a shorter path is judged sooner, which leaves time for other shortcuts; half of it is for smoothing
-            while length(model, path) < 0.9 * before and (before == np.inf or BUDGET.spent < POLISHED):
+            while length(model, path) < 0.9 * before and (before == np.inf or (self._held and BUDGET.spent < POLISHED)):
                 before = length(model, path)
-                with self._in_time(path), within_budget(BUDGET.left * (0.5 if self._held else 1.0)):
+                with self._in_time(path, 0.5 if self._held else 1.0):
                     # limbs that move evenly cost as much as five other shortcuts
                     path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
             with self._in_time(path):
@@ -95,7 +98,7 @@ class Search:
         """Paths drawn tight: the shortest one again and again, and where that is tight the next, as time lets them."""
         model, found = self._problem.scene.model, list[list[Array]]()
         waiting = sorted(paths, key=lambda path: length(model, path))
-        while waiting and not holds(self._problem) and self._local is not self._slides and BUDGET.spent < POLISHED:
+        while waiting and self._tightens and BUDGET.spent < POLISHED:
             path = waiting.pop(0)
             with self._in_time(path):
                 left = BUDGET.left
@@ -178,7 +181,7 @@ class Search:
         way, self._straight = self._local.towards(start, end)
         if self._straight:
             return [start, *way[:-1], end]
-        if holds(self._problem):
+        if self._held:  # steps along things found none of 20 ways, and projected ones are sooner
             return []
         way, met = self._slides.towards(end, start)
         return [start, *way[-2::-1], end] if met else []

@@ -161,7 +161,9 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
         for part in _runs(anew):
             mixed[[part.start, part.stop - 1]] = found[[part.start, part.stop - 1]]
             found[part], blocked[part.start : part.stop - 1] = local.settled(mixed[part])
-        if BUDGET.over or not blocked.any():
+        if BUDGET.over:
+            return path
+        if not blocked.any():
             break
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         anew = near > 0.01 * near.max()

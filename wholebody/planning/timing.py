@@ -20,6 +20,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
+from wholebody.methods.control import BUDGET
 from wholebody.motion.trajectory.retiming import passed
 from wholebody.planning.smoothing import places
 
@@ -57,8 +58,8 @@ class Pace(Checked):
 class Timing:
     """When the places of a path are passed: a cubic spline through postures (m, nq), from rest to rest."""
 
-    def __init__(self, figure: Figure, path: Array, pace: Pace, corrected: Callable[[Array], Array]) -> None:
-        self._figure, self._path, self._pace, self._corrected = figure, path, pace, corrected
+    def __init__(self, figure: Figure, path: Array, pace: Pace) -> None:
+        self._figure, self._path, self._pace = figure, path, pace
         knots = np.arange(len(path))
         self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))
         limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
@@ -71,13 +72,16 @@ class Timing:
         found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 
-    def within(self) -> Array:
-        """The frames of the fastest timing whose differences keep the limits, each on what is held."""
-        slower, exact = 1.0, False
-        for _ in range(12):  # a motion whose derivatives keep the limits is slowed until its frames do
+    def within(self, corrected: Callable[[Array], Array] | None = None) -> Array:
+        """The frames of the fastest timing whose differences keep the limits, each corrected (nq,) where they do."""
+        slower, exact = 1.0, corrected is None
+        for _ in range(11):  # a motion whose derivatives keep the limits is slowed until its frames do
             q = self.frames(slower)
-            if exact:
-                q[1:-1] = [self._corrected(frame) for frame in q[1:-1]]
+            if exact and corrected is not None:
+                for k in range(1, len(q) - 1):
+                    if BUDGET.over:
+                        return q
+                    q[k] = corrected(q[k])
             use = used(self._figure, q, self._pace)
             over = max(use.velocity, np.sqrt(use.acceleration))
             if over <= 1.0 and exact:

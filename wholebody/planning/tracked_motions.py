@@ -16,8 +16,6 @@ from wholebody.planning.projected_motions import ProjectedMotions
 from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks import Posture
-from wholebody.tasks.base import filled
 from wholebody.tracking.qp_strategy import Attraction
 
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
@@ -27,9 +25,7 @@ LOOSE = 0.1
 
 
 class TrackedMotions:
-    """Motions by steps of the QP tracker, for figures that keep constraints on the way."""
-
-    # postures are minima of a measure; where something is held goals, with short steps, which miss it by squares
+    """Motions by steps of the QP tracker to minima of a measure, for figures that keep inequalities on the way."""
 
     searches: ClassVar[int] = 2
     samples: ClassVar[int] = 12
@@ -41,17 +37,14 @@ class TrackedMotions:
         self.geodesics = (ProjectedMotions if holds(problem) else Geodesics)(problem, workspace)
         self._problem = problem.with_start(problem.start)
         self._model = problem.scene.model
-        self._goal = Posture(problem.start).resolve(problem.scene, problem.start)
-        self._held = holds(problem)
-        self.shares = np.ones(self._model.nv) if self._held else self.geodesics.shares
+        self.shares = self.geodesics.shares
         self._attraction = Attraction(problem.start, self.shares**2)
         self._loose = np.full(self._model.nv, LOOSE)
         for root in problem.scene.figure.roots.values():
             place = self._model.joints[root].idx_v
             self._loose[place : place + 3] = 1.0
-        self.partial = not self._held  # what is held takes all joints along
-        self._problem.goals = (self._goal,) if self._held else ()
-        self._problem.measures = () if self._held else (self._attraction,)
+        self.partial = self.geodesics.partial
+        self._problem.goals, self._problem.measures = (), (self._attraction,)
         self._problem.clearances = problem.clearances + MARGIN
         self._tracker = QP(restarts=0).tracker(self._problem, 1.0)
         self._resting = self._problem.with_start(problem.start)
@@ -69,7 +62,7 @@ class TrackedMotions:
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `Geodesics`; a geodesic if it may be, as it costs a tenth of steps."""
-        if not self._held and (way := self.geodesics.joined(q, target, most)):
+        if way := self.geodesics.joined(q, target, most):
             return way
         way, met = self.towards(q, target, most)
         return way if met else []
@@ -91,8 +84,6 @@ class TrackedMotions:
         way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target, factors)
         self._attraction.weigh(factors**2)
         self._attraction.toward(target)
-        if self._held:
-            self._problem.goals = (filled(self._goal, target=target, resolved_target=target),)
         while left > REACHED:
             here, before, q = q, rest, self._stepped(q)
             left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target, factors)
@@ -129,7 +120,11 @@ class TrackedMotions:
 
     def projected(self, q: Array) -> Array:
         """See `Geodesics`."""
-        return self._settled(q) if self._held else q
+        return self.geodesics.projected(q)
+
+    def corrected(self, q: Array) -> Array:
+        """See `Geodesics`."""
+        return self.geodesics.corrected(q)
 
     def _settled(self, q: Array) -> Array:
         for _ in range(2):  # what is held is missed by the square of a step
@@ -154,7 +149,6 @@ class TrackedMotions:
 
     def _rest(self, q: Array, target: Array, factors: Array) -> float:
         return float(np.linalg.norm(factors * self.shares * pin.difference(self._model, q, target)))
-
 
 
 LocalPlanner: TypeAlias = Geodesics | TrackedMotions  # what makes the edges of trees
