@@ -19,16 +19,20 @@ import wholebody as wb
 from tests.audits.plan_scenes import hand_into_box, person_at_gap
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.planning import Pace, Plan
 from wholebody.planning.ends import nearer
-from wholebody.planning.local_planner import Geodesics, TrackedMotions
+from wholebody.planning.local_planner import Geodesics
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
+from wholebody.planning.projected_motions import ProjectedMotions
+from wholebody.planning.projection_kernel import displace
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, places, refined, shortcut
 from wholebody.planning.tightening import tighten
+from wholebody.planning.tracked_motions import TrackedMotions
 
 
 def shelf(number: int) -> tuple[wb.Problem, Array]:
@@ -380,12 +384,18 @@ def test_goals_out_of_reach_and_wrong_ends_are_told() -> None:
     late = wb.plan(wb.Scene(human), "standing", far_away, constraints=feet, time_limit=0.1)
     assert late.message.startswith("no posture was found in time that meets the goals")
     beyond = np.array(end)
-    beyond[0] = scene.figure.limits.upper[0] + 0.1
-    with pytest.raises(wb.InputError, match=r"plan: the goal is .* beyond limits"):
+    joint, limit = scene.model.names[1], scene.figure.limits.upper[0]
+    beyond[0] = limit + 0.1
+    named = rf"plan: at the goal {joint} is {limit + 0.1:.4g}, beyond its limits .* and {limit:.4g}"
+    with pytest.raises(wb.InputError, match=named):
         wb.plan(scene, problem.start, beyond)
     scene.add(wb.Sphere(0.2), name="ball", at=scene.figure.placement(problem.start, "tool").translation)
-    with pytest.raises(wb.InputError, match=r"plan: the start is .* beyond things"):
+    with pytest.raises(wb.InputError, match=r"plan: at the start .*ball.* overlap by \d+ mm"):
         wb.plan(scene, problem.start, end)
+    moved = human.posture("standing").copy()
+    moved[0] += 0.3
+    with pytest.raises(wb.InputError, match=r"plan: the goal misses Hold\(.*left_foot.*\) by 0\.3"):
+        wb.plan(wb.Scene(human), "standing", moved, constraints=feet)
 
 
 def test_a_half_space_that_is_carried_is_refused(planar_arm: Callable[..., wb.Figure]) -> None:
@@ -645,3 +655,88 @@ def test_a_board_turns_to_get_through_a_gap(free_bodies: Callable[..., wb.Figure
     found = wb.plan(scene, figure.neutral, end)
     check(found, figure.neutral, end, Pace())
     assert least_along(scene, found.clip.q, least_distance) >= -1e-6
+
+
+def test_an_iteration_of_a_projection_is_the_least_within_limits() -> None:
+    """The pseudo-inverse gives it, and where a joint ends at its limit, that of the other columns."""
+    rng = np.random.default_rng(3)
+    rows, missed, away = rng.normal(size=(3, 6)), 0.1 * rng.normal(size=3), np.zeros(6)
+    none, wide = np.zeros((2, 3)), np.array([[-1.0], [1.0]]) + np.zeros((2, 6))
+    assert displace(rows, missed, none, none, wide, away)
+    free = -np.linalg.pinv(rows) @ missed
+    np.testing.assert_allclose(away, free, atol=1e-6)
+    narrow, joint = wide.copy(), int(np.argmax(np.abs(free)))
+    narrow[:, joint] *= 0.5 * abs(free[joint])
+    assert displace(rows, missed, none, none, narrow, away)
+    ends = np.clip(free[joint], *narrow[:, joint])
+    others = -np.linalg.pinv(np.delete(rows, joint, axis=1)) @ (missed + rows[:, joint] * ends)
+    np.testing.assert_allclose(np.delete(away, joint), others, atol=1e-6)
+    assert not displace(rows, np.zeros(3), none, none, wide, away)
+
+
+class Upright(wb.Constraint):
+    """The third axis of a frame stays vertical."""
+
+    upper = np.zeros(())
+
+    def __init__(self, frame: str) -> None:
+        self.frame = frame
+
+    def resolve(self, scene: wb.Scene, start: Array) -> Upright:
+        self.index = scene.model.getFrameId(self.frame)
+        return self
+
+    def value(self, state: Any) -> Array:
+        return np.array(state.frame(self.index).rotation[:2, 2])
+
+    def jacobian(self, state: Any) -> Array:
+        turned = pin.getFrameJacobian(state.model, state.data, self.index, pin.LOCAL_WORLD_ALIGNED)[3:]
+        return np.asarray((-pin.skew(state.frame(self.index).rotation[:, 2]) @ turned)[:2])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_level_tool_goes_past_a_box(least_distance: Distance, seed: int) -> None:
+    """Every frame is level by the arm's own kinematics, and between frames it is as nearly so."""
+    figure, start = known_arm("panda")
+    scene = wb.Scene(figure).add(wb.Box((0.25, 0.08, 0.35)), name="box", at=(0.45, 0.0, 0.175))
+    held: list[Any] = []
+    level, ends, q = wb.Axis("tool", (0, 0, 1), direction=(0, 0, 1)), list[Array](), start
+    for side in (0.3, -0.3):
+        goals = [wb.Point("tool", (0.45, side, 0.3)), level]
+        answer = wb.solve(wb.Problem(scene, q, goals=goals, constraints=held, clearance=0.005))
+        assert answer.solved
+        ends.append(q := answer.q)
+        held = [Upright("tool")]
+    assert scene.sweep(*ends) is not None
+    found = wb.plan(scene, *ends, constraints=[Upright("tool")], seed=seed)
+    assert found.solved, found.message
+    for q in found.clip.q:
+        assert np.abs(figure.placement(q, "tool").rotation[:2, 2]).max() <= 1e-4
+    assert least_along(scene, found.clip.q, least_distance) >= -5e-4
+
+
+def test_projected_steps_stay_on_what_is_held_and_end_where_they_should() -> None:
+    """Both feet are held, so a raw step of all joints would slide them by centimetres."""
+    human = wb.load("human")
+    start = human.posture("standing")
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    scene, lower = wb.Scene(human), wb.Point("pelvis", human.placement(start, "pelvis").translation - (0.0, 0.0, 0.1))
+    bent = wb.solve(wb.Problem(scene, start, goals=[lower], constraints=feet))
+    assert bent.solved
+    problem = wb.Problem(scene, start, constraints=feet)
+    with problem.borrow() as workspace:
+        local = ProjectedMotions(problem, workspace)
+        for q in (start, bent.q):
+            local.admit(q)
+        way, met = local.towards(start, bent.q)
+        raw = np.asarray(pin.interpolate(human.model, start, bent.q, 0.5))
+    assert met
+    assert len(way) > 5
+    np.testing.assert_array_equal(way[-1], bent.q)
+
+    def slid(q: Array) -> float:
+        feet = [[human.placement(at, f"{side}_foot").translation for side in ("left", "right")] for at in (q, start)]
+        return float(np.abs(np.subtract(*feet)).max())
+
+    assert slid(raw) > 1e-3
+    assert max(map(slid, way)) <= 2e-5

@@ -41,6 +41,7 @@ TOGETHER = (
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
         "wholebody.planning.multiplier_kernel",
+        "wholebody.planning.projection_kernel",
     ),
     (
         "wholebody.methods.qp.tracking",

@@ -11,9 +11,10 @@ from wholebody.base.arrays import Array
 from wholebody.methods.conclusion import meets
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.method import QP
-from wholebody.planning.local_planner import Geodesics, LocalPlanner
+from wholebody.planning.local_planner import Geodesics
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length
+from wholebody.planning.tracked_motions import LocalPlanner
 from wholebody.problem import Problem
 
 ENDS = 8  # postures that meet goals; more = ends that are reached more easily, for a solve each

@@ -20,17 +20,18 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.compiled import compile_all, compile_seconds
 from wholebody.base.errors import InputError
+from wholebody.figures.model_check import joint_of
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
 from wholebody.methods.simplification import still_dofs
 from wholebody.motion.clip import Clip
 from wholebody.planning.ends import answers
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.search import Search
 from wholebody.planning.smoothing import length, refined, resampled, smooth
 from wholebody.planning.tightening import tighten
 from wholebody.planning.timing import Pace, Timing, used
+from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal
@@ -49,6 +50,7 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
     "wholebody.planning.multiplier_kernel",
+    "wholebody.planning.projection_kernel",
 )
 
 
@@ -138,7 +140,7 @@ def plan(
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
-            tracked = holds(problem) or bool(problem.bounds or scene.figure.followers)
+            tracked = not holds(problem) and bool(problem.bounds or scene.figure.followers)
             slides = TrackedMotions(problem, workspace)
             local: LocalPlanner = slides if tracked else slides.geodesics
             search = Search(problem, judge.in_time, (local, slides), ends, (sampler, rng))
@@ -179,12 +181,30 @@ def _posture(problem: Problem, goal: Any) -> Array:
 
 
 def _check_end(problem: Problem, q: Array, what: str) -> None:
-    judged = assess(problem, q)
-    found = {"things": judged.penetration, "limits": judged.limit_violation, "constraints": judged.constraint_violation}
-    found["what is frozen at the start"] = _moved(problem, q[None])
-    for name, by in found.items():
-        if not by <= KEPT:
-            raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond {name}; give a posture of wb.solve")
+    judged, scene = assess(problem, q), problem.scene
+    if not judged.penetration <= KEPT:
+        deepest = [scene.piece_owner[piece] for piece in scene.contacts(q, 0.0).pair[:1].ravel().tolist()]
+        who, depth = " and ".join(deepest) or "things", f"{1e3 * judged.penetration:.3g} mm"
+        raise InputError(f"plan: at the {what} {who} overlap by {depth}; give a posture of wb.solve")
+    if not judged.limit_violation <= KEPT:
+        limits = scene.figure.limits
+        here = q[limits.idx_q]
+        most = int(np.argmax(np.maximum(limits.lower - here, here - limits.upper)))
+        joint = scene.model.names[joint_of(scene.model, int(limits.idx_v[most]))]
+        raise InputError(
+            f"plan: at the {what} {joint} is {here[most]:.4g}, beyond its limits {limits.lower[most]:.4g} and "
+            f"{limits.upper[most]:.4g}; give figure.clamp(q) for the nearest posture within limits"
+        )
+    if not judged.constraint_violation <= KEPT:
+        state = scene.state(q)
+        values = [(term, term.value(state)) for term in problem.constraints]
+        misses = [np.maximum(term.lower - value, value - term.upper).max(initial=0.0) for term, value in values]
+        worst = int(np.argmax(misses))
+        raise InputError(
+            f"plan: the {what} misses {values[worst][0]!r} by {misses[worst]:.3g} m or rad; give a posture of wb.solve"
+        )
+    if not (by := _moved(problem, q[None])) <= KEPT:
+        raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond what is frozen at the start")
 
 
 def _moved(problem: Problem, q: Array) -> float:
@@ -206,13 +226,14 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     with judge.in_time(path):
         even, _ = local.settled(refined(model, path, count))
         smoothed = smooth(model, even, local)
-    found = judge.judged([smoothed])
+    found = judge.judged([smoothed], local)
     judge.took = left - BUDGET.left
     if not (found.solved or BUDGET.over):
-        found = judge.judged([even])
-    if not (found.solved or BUDGET.over):
-        # 12 postures of each straight part; more: sooner at the end, dearer
-        found = judge.judged([local.settled(resampled(model, pair, 12))[0] for pair in pairwise(path)])
+        found = judge.judged([even], local)
+        if not (found.solved or BUDGET.over):
+            # 12 postures of each straight part; more: sooner at the end, dearer
+            parts = [local.settled(resampled(model, pair, 12))[0] for pair in pairwise(path)]
+            found = judge.judged(parts, local)
     return found
 
 
@@ -244,20 +265,20 @@ class _Judge:
             spent.append(_computed() - began)
         self._frame = 3.0 * min(spent)  # s: each is also swept from the one before
 
-    def in_time(self, path: list[Array]) -> AbstractContextManager[None]:
+    def in_time(self, path: list[Array], share: float = 1.0) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
         figure = self.problem.scene.figure
         steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
         fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
         left, judging = BUDGET.left, self._frame * (0.6 + 2.0 * fastest) / self._pace.dt
         # shortcuts through a long path make it shorter, so that they have some time in any case
-        return within_budget(max(left - judging, 0.2 * left, 1e-9))
+        return within_budget(share * max(left - judging, 0.2 * left, 1e-9))
 
-    def judged(self, parts: Sequence[Array]) -> Plan:
+    def judged(self, parts: Sequence[Array], local: LocalPlanner) -> Plan:
         """The motion along parts (m, nq) of a path as fast as the limits allow, each from rest to rest; its figures."""
         scene, pace = self.problem.scene, self._pace
         # the last posture of a part is the first of the next one: a step of rest, in which no acceleration adds up
-        q = np.concatenate([Timing(scene.figure, part, pace).within() for part in parts])
+        q = np.concatenate([Timing(scene.figure, part, pace).within(local.corrected) for part in parts])
         use = used(scene.figure, q, pace)
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
         for frame in q:  # as far as the first that misses something
@@ -270,12 +291,14 @@ class _Judge:
             f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
             f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
         ]
-        if not any(faults):
+        late = BUDGET.over
+        if not (late or any(faults)):
             sweep = Sweep(scene.model, scene.geometry, scene.pair_table)
             free = (not BUDGET.over and sweep.first_contact(*pair, tolerance=PASSED) is None for pair in pairwise(q))
             passed = next((k for k, kept in enumerate(free, 1) if not kept), 0)
             faults.append(f"something is passed through before frame {passed}" if passed else "")
-        if BUDGET.over:
+            late = BUDGET.over
+        if late:
             faults = ["the time limit ended the judgement of a motion"]
         said = "; ".join(fault for fault in faults if fault)
         return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)

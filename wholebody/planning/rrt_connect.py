@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 
 GEODESICS = 100  # samples that geodesics alone lead to; more = shorter paths, later where these find none
 

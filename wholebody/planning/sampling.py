@@ -69,6 +69,8 @@ class Sampler:
             away[joint.idx_v : joint.idx_v + 6] = pin.log6(here.actInv(there)).vector
         for joint in self._loose:
             away[joint.idx_v : joint.idx_v + 3] = self._loosely(q, joint, spread)
+        if self._held:  # a random share of the freedoms stays, so that not all of a body wanders on the way
+            away[rng.uniform(size=model.nv) > rng.uniform()] = 0.0
         away[self._frozen] = 0.0
         return np.asarray(pin.integrate(model, q, away))
 

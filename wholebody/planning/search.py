@@ -12,14 +12,16 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.ends import End, nearer
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
+from wholebody.planning.local_planner import Geodesics
 from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import length, shortcut
 from wholebody.planning.tightening import tighten
+from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
+HELD_AGAIN = 0.15  # the same where something is held, as a second search of a body takes as long as the first
 AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
@@ -33,7 +35,7 @@ class Search:
     def __init__(
         self,
         problem: Problem,
-        in_time: Callable[[list[Array]], AbstractContextManager[None]],
+        in_time: Callable[..., AbstractContextManager[None]],
         planners: tuple[LocalPlanner, TrackedMotions],
         ends: Iterator[End],
         random: tuple[Sampler, np.random.Generator],
@@ -43,11 +45,15 @@ class Search:
         self._sampler, self._rng = random
         self._reached: list[Array] = []
         self._said = ""
-        free_root = bool(problem.scene.figure.roots) and not holds(problem)
+        self._held = holds(problem)
+        free_root = bool(problem.scene.figure.roots) and not self._held
         self._bodily = free_root and self._local is not self._slides
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
-        self._straight, self._until = False, AGAIN
+        # programs of a body that holds something have thousands of rows
+        self._tightens = self._local is not self._slides and not (self._held and problem.scene.figure.roots)
+        self._again = HELD_AGAIN if self._held else AGAIN
+        self._straight, self._until = False, self._again
 
     def shortest(self) -> tuple[list[Array] | None, str]:
         """The shortest of some paths, with shortcuts, and how it was found; or None and why there is none."""
@@ -62,9 +68,14 @@ class Search:
                 break
             if self._straight and self._proven(path):
                 return path, "the straight motion"
+            before = np.inf
+            # a shorter path is judged sooner, which leaves time for other shortcuts; half of it is for smoothing
+            while length(model, path) < 0.9 * before and (before == np.inf or (self._held and BUDGET.spent < POLISHED)):
+                before = length(model, path)
+                with self._in_time(path, 0.5 if self._held else 1.0):
+                    # limbs that move evenly cost as much as five other shortcuts
+                    path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
             with self._in_time(path):
-                # limbs that move evenly cost as much as five other shortcuts
-                path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
                 path = nearer(self._problem, path, self._local, self._sampler)
             paths.append(path)
             if (found := length(model, path)) < most:
@@ -72,8 +83,8 @@ class Search:
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
-            long = self._local is not self._slides and not self._bodily and most > LONG * straight
-            self._until, enough = (LATER, np.inf) if long else (AGAIN, self._local.samples)
+            long = not (self._local is self._slides or self._bodily or self._held) and most > LONG * straight
+            self._until, enough = (LATER, np.inf) if long else (self._again, self._local.samples)
         ready = sorted([*self._polished(paths), *paths], key=lambda path: length(model, path))
         best = next((path for path in ready if self._proven(path)), None)
         if best is not None:
@@ -87,7 +98,7 @@ class Search:
         """Paths drawn tight: the shortest one again and again, and where that is tight the next, as time lets them."""
         model, found = self._problem.scene.model, list[list[Array]]()
         waiting = sorted(paths, key=lambda path: length(model, path))
-        while waiting and self._local is not self._slides and BUDGET.spent < POLISHED:
+        while waiting and self._tightens and BUDGET.spent < POLISHED:
             path = waiting.pop(0)
             with self._in_time(path):
                 left = BUDGET.left
@@ -116,7 +127,7 @@ class Search:
         """
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
-        sliding = self._problem.scene.figure.roots and self._local is not self._slides
+        sliding = self._problem.scene.figure.roots and type(self._local) is Geodesics
         trees = RRTConnect(
             self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
         )
@@ -170,6 +181,8 @@ class Search:
         way, self._straight = self._local.towards(start, end)
         if self._straight:
             return [start, *way[:-1], end]
+        if self._held:  # steps along things found none of 20 ways, and projected ones are sooner
+            return []
         way, met = self._slides.towards(end, start)
         return [start, *way[-2::-1], end] if met else []
 

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.model_check import joint_of
 from wholebody.methods.control import BUDGET
-from wholebody.planning.local_planner import LocalPlanner
+from wholebody.planning.tracked_motions import LocalPlanner
 
 LEAST = 0.01  # rad, m: by which a part becomes shorter where one joint moves evenly
 APART = 0.5  # rad, m: between the postures of a path that is tightened; smaller = shorter paths, later
@@ -161,7 +161,9 @@ def smooth(model: pin.Model, path: Array, local: LocalPlanner) -> Array:
         for part in _runs(anew):
             mixed[[part.start, part.stop - 1]] = found[[part.start, part.stop - 1]]
             found[part], blocked[part.start : part.stop - 1] = local.settled(mixed[part])
-        if BUDGET.over or not blocked.any():
+        if BUDGET.over:
+            return path
+        if not blocked.any():
             break
         near = gaussian_filter1d(np.convolve(blocked, [1.0, 1.0]), 0.5 * SPREAD * len(path), mode="nearest")
         anew = near > 0.01 * near.max()

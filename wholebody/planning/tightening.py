@@ -23,9 +23,9 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import BUDGET, within_budget
-from wholebody.planning.local_planner import LocalPlanner, TrackedMotions
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.smoothing import banded, length
+from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 
 DAMPING = 0.005  # m of the first program, and least; larger = shorter displacements, more programs
 

@@ -7,6 +7,7 @@ pass accelerates as much as these let it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -19,6 +20,7 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
+from wholebody.methods.control import BUDGET
 from wholebody.motion.trajectory.retiming import passed
 from wholebody.planning.smoothing import places
 
@@ -70,16 +72,22 @@ class Timing:
         found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 
-    def within(self) -> Array:
-        """The frames of the fastest timing whose differences keep the limits."""
-        slower = 1.0
-        for _ in range(10):  # a motion whose derivatives keep the limits is slowed until its frames do
+    def within(self, corrected: Callable[[Array], Array] | None = None) -> Array:
+        """The frames of the fastest timing whose differences keep the limits, each corrected (nq,) where they do."""
+        slower, exact = 1.0, corrected is None
+        for _ in range(11):  # a motion whose derivatives keep the limits is slowed until its frames do
             q = self.frames(slower)
+            if exact and corrected is not None:
+                for k in range(1, len(q) - 1):
+                    if BUDGET.over:
+                        return q
+                    q[k] = corrected(q[k])
             use = used(self._figure, q, self._pace)
             over = max(use.velocity, np.sqrt(use.acceleration))
-            if over <= 1.0:
+            if over <= 1.0 and exact:
                 break
-            slower *= 1.001 * over
+            exact = exact or over <= 1.0
+            slower *= 1.001 * max(over, 1.0)
         return q
 
 

@@ -1,0 +1,137 @@
+"""Motions of figures that hold something: steps of geodesics, each projected onto what is held (CBiRRT).
+
+A projection solves ``c(q) = 0`` for what is held and for other constraints that a posture misses, by Newton's method
+with the pseudo-inverse of their Jacobian J,
+
+    dq = -J' (J J' + d I)^-1 c(q),   within joint limits,
+
+so that it is the nearest posture to first order (Berenson and others 2009). Things are not in it: steps into them end.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Mask
+from wholebody.methods.control import BUDGET
+from wholebody.planning.local_planner import Geodesics, Kept
+from wholebody.planning.projection_kernel import displace
+from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
+
+STEP = 0.05  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
+ITERATIONS = 8  # of a projection, which takes two or three from a step
+
+
+class ProjectedMotions(Geodesics):
+    """Steps towards a posture that are projected onto what is held."""
+
+    searches: ClassVar[int] = 4
+    samples: ClassVar[int] = 200
+    rounds: ClassVar[int] = 50
+    tries: ClassVar[int] = 25
+    spacing: ClassVar[float] = 0.04
+
+    def __init__(self, problem: Problem, workspace: Workspace) -> None:
+        super().__init__(problem, workspace)
+        self.partial = False  # what is held takes all joints along
+        self.shares = np.ones(self._model.nv)
+        bare = problem.with_start(problem.start)
+        bare.goals = bare.measures = ()
+        self._lineariser = bare.lineariser(workspace)
+        terms, state = problem.constraints, workspace.state.update(problem.start)
+        sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
+        self._bounds = np.hstack([np.zeros((2, 0)), *sides])
+        self._equal = self._bounds[0] == self._bounds[1]
+        self._never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(self._bounds)
+        self._away = np.zeros(self._model.nv)
+        # what is held is missed between two postures by the square of a step; others have room as of their postures
+        self._followed = Kept(np.where(self._equal, np.array([[-np.inf], [np.inf]]), self._bounds), self._followed.room)
+
+    def projected(self, q: Array) -> Array:
+        """The posture (nq,) near q that meets what is held; q itself where none is found."""
+        found = self._projected(q)
+        return q if found is None else found
+
+    def corrected(self, q: Array) -> Array:
+        """See `Geodesics`: the same two iterations for each posture, so that a smooth motion stays so."""
+        for _ in range(2):
+            q, _ = self._displaced(q, self._never, self._bounds)
+        return q
+
+    def _projected(self, q: Array) -> Array | None:
+        aims = np.where(self._equal, self._bounds, self._kept.sides)
+        for _ in range(ITERATIONS):
+            q, missed = self._displaced(q, self._kept.sides, aims)
+            if not missed:
+                return q
+        return None
+
+    def _displaced(self, q: Array, sides: Array, aims: Array) -> tuple[Array, bool]:
+        """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""
+        at, away = self._lineariser.packed(q, -1.0), self._away  # no pairs
+        needed = displace(at.jacobian, at.value, sides, aims, at.box, away)
+        return (np.asarray(pin.integrate(self._model, q, away)), True) if needed else (q, False)
+
+    def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
+        """See `Geodesics`; it does not get to a target that misses what is held."""
+        return self._stepped(q, target, np.inf)
+
+    def joined(self, q: Array, target: Array, most: float) -> list[Array]:
+        """See `Geodesics`."""
+        way, met = self._stepped(q, target, most)
+        return way if met else []
+
+    def _stepped(self, q: Array, target: Array, most: float) -> tuple[list[Array], bool]:
+        way, gone, met = list[Array](), 0.0, self.met(target)
+        motion = np.asarray(pin.difference(self._model, q, target))
+        left = float(np.linalg.norm(motion))
+        while gone + left <= most and not BUDGET.over:
+            size = float(np.abs(motion).max(initial=0.0))
+            last = met and size <= STEP
+            share = min(1.0, STEP / max(size, 1e-15))
+            there = target if last else self._projected(np.asarray(pin.integrate(self._model, q, share * motion)))
+            if there is None or not self._leads(q, there):
+                break
+            way.append(there)
+            if last or share == 1.0:
+                return way, last
+            gone += float(np.linalg.norm(pin.difference(self._model, q, there)))
+            motion, before, q = np.asarray(pin.difference(self._model, there, target)), left, there
+            left = float(np.linalg.norm(motion))
+            if left > before - 0.1 * share * before:  # what is held does not let it nearer
+                break
+        return way, False
+
+    def _leads(self, q: Array, there: Array) -> bool:
+        """Whether a step from q to a posture (nq,) is short, as one is that does not jump, and free."""
+        motion = np.asarray(pin.difference(self._model, q, there))
+        short = bool(np.abs(motion).max(initial=0.0) <= 3.0 * STEP)
+        return short and self._joins(q, motion, self._seen(q), self._seen(there), self._followed)
+
+    def through(self, path: Array) -> list[Array]:
+        """See `Geodesics`."""
+        found, blocked = self.settled(path)
+        return [] if blocked.any() else list(found[1:])
+
+    def settled(self, path: Array) -> tuple[Array, Mask]:
+        """See `Geodesics`."""
+        found, blocked = path.copy(), np.ones(len(path) - 1, dtype=bool)
+        for k, q in enumerate(path[1:], start=1):
+            if BUDGET.over:
+                break
+            found[k] = self.projected(q) if k < len(path) - 1 else q
+            blocked[k - 1] = not self._leads(found[k - 1], found[k])
+        steps, usual = (
+            np.array([np.linalg.norm(pin.difference(self._model, *pair)) for pair in pairwise(each)])
+            for each in (found, path)
+        )
+        return found, blocked | (steps > 1.5 * usual + 1e-3)  # rad, m: projected on two sides of something
+
+    def follows(self, q: Array, there: Array) -> bool:
+        """See `Geodesics`."""
+        return self._leads(q, there)
