@@ -194,8 +194,8 @@ def test_stance_counts_what_the_feet_are_off_side_by_side_and_the_load_off_their
     turned = np.cos(np.radians(10.0)) * way[1]  # as either foot sees it, which the leg has tipped by ten degrees
     assert stance.of_feet().value(State(model).update(person.with_joints(standing, dict.fromkeys(
         ("left_hip_abduction", "right_hip_abduction"), np.radians(10.0)
-    )))) == pytest.approx(60.0 * (turned - apart) ** 2, rel=1e-6)  # fmt: skip
-    assert wide == pytest.approx(60.0 * (turned - apart) ** 2, rel=1e-4)  # both sides alike: equal load
+    )))) == pytest.approx(300.0 * (turned - apart) ** 2, rel=1e-6)  # fmt: skip
+    assert wide == pytest.approx(300.0 * (turned - apart) ** 2, rel=1e-4)  # both sides alike: equal load
     bowed, _, borne = value(spine1_flexion=20.0, spine2_lateral=10.0)
     assert borne > 0.1
     assert bowed == pytest.approx(borne, rel=1e-9)

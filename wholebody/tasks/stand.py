@@ -25,7 +25,7 @@ from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, face
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_beyond, segments_on, surface
 
-STANCE_WEIGHTS = np.array((60.0, 60.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/m^2, but 1/rad^2 of the angle: ESTIMATE
+STANCE_WEIGHTS = np.array((60.0, 300.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/m^2, but 1/rad^2 of the angle: ESTIMATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ class Stand(TermOfParts):
 class Stance(SumOfSquares):
     """Squared distance of two feet from side by side, as in the figure's first posture, and from equal load.
 
-    ``60 f^2 + 60 w^2 + 4 t^2 + 600 (x^2 + y^2)``: f is by how much one foot is ahead of the other, w by how much their
+    ``60 f^2 + 300 w^2 + 4 t^2 + 600 (x^2 + y^2)``: f is by how much one foot is ahead of the other, w by how much their
     distance to the side differs from that of the posture, each the mean of what either foot sees [m], t the sine of the
     angle between them, likewise. A person of median size has 0.17 m in the posture, with parallel feet. People who
     stand as they like have 0.165 m (standard deviation 0.038), or 0.203 m (0.046). x and y are how far the centre of
