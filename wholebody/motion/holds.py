@@ -141,7 +141,8 @@ class Holds:
         self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
         self._places: dict[tuple[int, int], Array] = {}
         self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
-        self._let_go: set[tuple[int, int]] = set()  # the same of all runs, with what is too short to be held between
+        # the same of all runs, with what is too short to be held between
+        self.given_up: set[tuple[int, int]] = set()
 
     def lost(self, frame: int, q: Array, places: Array, held: tuple[Array, Array]) -> bool:
         """Whether points (h, 3) are too far from their things; then their goals and weights in `held` become zero."""
@@ -192,7 +193,7 @@ class Holds:
                     kept.append(stand)
                     continue
                 long = long_runs(reached, self.over)
-                self._let_go |= {(number, stand.first + frame) for frame in np.flatnonzero(~long).tolist()}
+                self.given_up |= {(number, stand.first + frame) for frame in np.flatnonzero(~long).tolist()}
                 own = self._places[number, stand.first]
                 for part in runs(long):
                     first = stand.first + part.first
@@ -215,7 +216,7 @@ class Holds:
                     continue
                 frames = range(contact.first, min(contact.end, len(q)))
                 gaps = np.array([touched.gap(contact, point, frame, q[frame], alone=True) for frame in frames])
-                gone = np.array([(number, frame) in self._let_go for frame in frames]) | (gaps > OUT_OF_REACH)
+                gone = np.array([(number, frame) in self.given_up for frame in frames]) | (gaps > OUT_OF_REACH)
                 if gone.any():
                     spans = [f"{contact.first + run.first} to {contact.first + run.end - 1}" for run in runs(gone)]
                     far = gaps[gone].max()
