@@ -211,7 +211,8 @@ def test_a_ball_keeps_the_range_of_its_swing(tmp_path: Path) -> None:
 
 def test_a_ball_at_the_world_keeps_its_range_beside_other_figures(tmp_path: Path) -> None:
     """The cone is of what carries the figure's world: no frame of its own has the name."""
-    text = """<mujoco><compiler angle="radian"/><worldbody><body name="arm"><joint name="ball" type="ball" range="0 0.8"/>
+    text = """<mujoco><compiler angle="radian"/><worldbody><body name="arm">
+    <joint name="ball" type="ball" range="0 0.8"/>
     <geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0"/></body></worldbody></mujoco>"""
     alone = wb.load(written(tmp_path, text))
     turned = np.array([0.0, 0.0, 1.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])  # by 90 degrees about z
