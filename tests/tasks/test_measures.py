@@ -267,3 +267,15 @@ def test_stance_has_derivatives_and_two_feet() -> None:
     assert wb.check_derivatives(wb.tasks.SeatCenterline("seat"), scene).agrees
     with pytest.raises(wb.InputError, match="feet has 1 names; give two"):
         wb.Problem(scene, measures=[wb.tasks.Stance(["left_foot"])])
+
+
+def test_a_ball_and_an_upright_capsule_have_a_middle(human: wb.Figure) -> None:
+    """Their faces are points, over whose size of zero the distance was not finite: no seat was found."""
+    scene = wb.Scene(human).add(wb.Sphere(0.3), name="ball", at=(0.0, 0.0, 0.3))
+    scene.add(wb.Capsule(0.1, 0.5), name="post", at=(1.0, 0.0, 0.3))
+    for name, x in (("ball", 0.0), ("post", 1.0)):
+        measure = wb.tasks.SeatCenterline(name).resolve(scene, human.neutral)
+        q = human.neutral.copy()
+        q[:2] = x, 0.05
+        assert measure.value(State(human.model).update(q)) == pytest.approx(0.5**2)
+        assert wb.check_derivatives(wb.tasks.SeatCenterline(name), scene).agrees

@@ -12,8 +12,17 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.errors import InputError
-from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, Member, is_root
-from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange
+from wholebody.figures.description import (
+    ROOT_JOINT,
+    Articulated,
+    Chain,
+    Description,
+    ExcludedPair,
+    JointCone,
+    Member,
+    is_root,
+)
+from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange, ReachCone
 from wholebody.figures.self_pairs import carriers_above, drop_rigid_pairs
 from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model, pairs_of
@@ -32,6 +41,8 @@ class _Part(NamedTuple):
     frames: tuple[int, ...]  # the same of its frames
     world: pin.SE3  # where its world is in the joint that carries it
     prefix: str  # what its names begin with
+    seat: str  # the frame of the model that carries its world
+    turn: Array  # (3, 3) of its world in the axes of that frame
 
 
 def check_single(figure: Articulated, name: str) -> None:
@@ -73,7 +84,7 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
     model, part = _with(pin.Model(base.model), figure, prefix, frame, at)
     joints = (0, *(model.getJointId(joint) for joint in list(base.model.names)[1:]))
     frames = tuple(model.getFrameId(one.name, one.type) for one in base.model.frames)
-    parts = [_Part(base, joints, frames, pin.SE3.Identity(), ""), part]
+    parts = [_Part(base, joints, frames, pin.SE3.Identity(), "", "universe", np.eye(3)), part]
     held: dict[str, Any] = {"base": base, "other": figure, "prefix": prefix}
     postures = {one: partial(_mounted_posture, posture=one, **held) for one in base.postures}
     rest = _on_model(model, posture=base.postures[0], **held)
@@ -131,7 +142,7 @@ def _with(model: pin.Model, figure: Articulated, prefix: str, frame: int, at: pi
     frames = (frame, *(made.getFrameId(one.name, one.type) for one in list(own.frames)[1:]))
     for one in made.frames:
         one.name = one.name.removesuffix(OF_LINK)
-    return made, _Part(figure, (seated, *joints[1:]), frames, world, prefix)
+    return made, _Part(figure, (seated, *joints[1:]), frames, world, prefix, seat.name, at.rotation)
 
 
 def _geometry(parts: Sequence[_Part], between: Sequence[Indices]) -> pin.GeometryModel:
@@ -231,10 +242,7 @@ def _described(part: _Part) -> Description:
         chains={prefix + name: Chain(named(joints), prefix + tip) for name, (joints, tip) in old.chains.items()},
         frames=named(old.frames),
         segments=named(old.segments),
-        cones={
-            prefix + name: with_values(cone, reference=prefix + cone.reference, limb=prefix + cone.limb)
-            for name, cone in old.cones.items()
-        },
+        cones={prefix + name: _named_cone(cone, part) for name, cone in old.cones.items()},
         collision_groups={prefix + name: prefix + group for name, group in old.collision_groups.items()},
         effort={prefix + name: weight for name, weight in old.effort.items()},
         excluded=tuple(ExcludedPair(prefix + a, prefix + b, why) for a, b, why in old.excluded),
@@ -242,6 +250,13 @@ def _described(part: _Part) -> Description:
         root_effort=old.root_effort[: 2 * len(figure.roots)],
         notes=tuple(f"{prefix[:-1]}: {note}" if prefix else note for note in old.notes),
     )
+
+
+def _named_cone(joint: JointCone, part: _Part) -> JointCone:
+    if joint.reference != "universe":
+        return with_values(joint, reference=part.prefix + joint.reference, limb=part.prefix + joint.limb)
+    cone = ReachCone(joint.cone.vertices @ part.turn.T, part.turn @ joint.cone.visible)
+    return with_values(joint, cone=cone, reference=part.seat, limb=part.prefix + joint.limb)
 
 
 def _named_range(part: MotionRange, prefix: str) -> MotionRange:

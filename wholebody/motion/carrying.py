@@ -54,7 +54,7 @@ def carrier(
         apart = [other for other in moving if np.ptp(_seen_from(tracks[name], tracks[other])) > RestLimits().height]
         if any((borne[other] & ~borne[name]).any() for other in apart):
             continue
-        on, moves = borne[name].any(axis=0), ~stands(tracks[name])
+        on, moves = borne[name].any(axis=0), ~stands(tracks[name], motion.dt)
         if (on & moves).any() and not (rests & ~on & moves).any():
             return name
     return ""

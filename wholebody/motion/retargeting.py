@@ -109,12 +109,13 @@ def retarget(
     if scene is not None:
         same_figure(scene, figure, "retarget")
     tracks = _tracks(motion, scene, things)
-    surface = None if scene is None else surface_of(scene, tracks)
+    surface = None if scene is None else surface_of(scene, tracks, motion.dt)
     if scene is not None and tracks and ground is not None and not isinstance(ground, Ground) and figure.root == "free":
         still_ground, joints = ground_on(motion, names, surface), skeleton_roles(motion, names)
         if on := carrier(motion, joints, scene, tracks, still_ground):
             seen, there, others = as_carried(motion, scene, tracks, on)
-            rests = checked_ground(seen, figure, ground, names, surface_of(there, others))  # nobody is carried twice
+            below = surface_of(there, others, motion.dt)
+            rests = checked_ground(seen, figure, ground, names, below)  # nobody is carried twice
             clip = retarget(seen, figure, there, rests, things=others, names=names, progress=progress)
             return brought_back(clip, tracks[on], tracks)
     roles = matched(motion, figure, names)
@@ -357,7 +358,7 @@ def bone_errors(
     if scene is not None:
         same_figure(scene, clip.figure, "bone_errors")
     roles = matched(motion, clip.figure, names)
-    surface = None if scene is None else surface_of(scene, clip.things)
+    surface = None if scene is None else surface_of(scene, clip.things, clip.dt)
     return errors_of(motion, clip, roles, ground_on(motion, {"skeleton": roles.joints}, surface))
 
 

@@ -16,19 +16,23 @@ Surface: TypeAlias = Callable[[Array, int], float | None]
 """Height of the first surface below a place (3,) in a frame, metres."""
 
 
-def stands(track: Array) -> Mask:
-    """(n,) when a thing with a track (n, 7) stands: from the frame before to that after it moves by less than 1 mm."""
-    after, before = np.vstack([track[1:], track[-1:]]), np.vstack([track[:1], track[:-1]])
+def stands(track: Array, dt: float) -> Mask:
+    """(n,) when a thing with a track (n, 7) stands: from 0.1 s before to 0.1 s after it moves by less than 1 mm."""
+    frames = max(1, round(0.1 / dt))  # s: longer makes slower things move, and those that come to rest stand later
+    padded = np.pad(track, ((frames, frames), (0, 0)), mode="edge")
+    after, before = padded[2 * frames :], padded[: -2 * frames]
     return np.asarray(np.maximum(np.abs(after - track), np.abs(track - before)).max(axis=1) < 1e-3)
 
 
-def surface_of(scene: Scene, tracks: Mapping[str, Array] | None = None, without: Collection[str] = ()) -> Surface:
+def surface_of(
+    scene: Scene, tracks: Mapping[str, Array] | None = None, dt: float = 1.0, without: Collection[str] = ()
+) -> Surface:
     """Height [m] of the first surface up to 2 m below a place (3,) in a frame; None for none, or in a thing.
 
-    Things with `tracks` (n, 7) have surfaces while they stand, those `without` none.
+    Things with `tracks` (n, 7), `dt` seconds a frame, have surfaces while they stand, those `without` none.
     """
     still, moving = list[tuple[coal.CollisionGeometry, coal.Transform3s]](), {} if tracks is None else tracks
-    pieces, stood = scene.geometry.geometryObjects, {name: stands(track) for name, track in moving.items()}
+    pieces, stood = scene.geometry.geometryObjects, {name: stands(track, dt) for name, track in moving.items()}
     for piece, owner in zip(pieces, scene.piece_owner, strict=True):
         if owner in scene.objects and scene.objects[owner].segment is None and owner not in {*without, *moving}:
             still.append((piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation)))

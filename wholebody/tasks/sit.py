@@ -141,9 +141,9 @@ class Sit(ContactTerm):
 class SeatCenterline(SumOfSquares):
     """Squared distance of the pelvis to the side of a seat's middle, over half of the seat's longer side.
 
-    So it counts on a chair and hardly on a bench, and not on what has no end. A person who sits by `Sit` has this
-    measure by default: else nothing says where on the seat, and of a task that is the same on the left and on the right
-    the answer is beside the middle, on one side or on the other.
+    So it counts on a chair and hardly on a bench, and not on what has no end; on a ball as on a seat of 0.2 m. A person
+    who sits by `Sit` has this measure by default: else nothing says where on the seat, and of a task that is the same
+    on the left and on the right the answer is beside the middle, on one side or on the other.
 
     Attributes:
         on: the seat.
@@ -182,7 +182,8 @@ class SeatCenterline(SumOfSquares):
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residual (1,) and its derivative (1, nv)."""
-        pelvis, middle, long = state.frame(self.place.frame), self.face.at(state)[0], float(self.face.half.max())
+        pelvis, middle = state.frame(self.place.frame), self.face.at(state)[0]
+        long = max(float(self.face.half.max()), 0.1)  # m: what is round has a point for a face
         left = (pelvis.rotation @ self.left)[None]
         rows = between(state, through(middle, left), self.place.joint, self.face.joint)
         return left @ (pelvis.translation - middle) / long, rows / long

@@ -209,6 +209,26 @@ def test_a_ball_keeps_the_range_of_its_swing(tmp_path: Path) -> None:
         assert cone.cone.contains([np.sin(angle), 0.0, np.cos(angle)]) == inside
 
 
+def test_a_ball_at_the_world_keeps_its_range_beside_other_figures(tmp_path: Path) -> None:
+    """The cone is of what carries the figure's world: no frame of its own has the name."""
+    text = """<mujoco><compiler angle="radian"/><worldbody><body name="arm">
+    <joint name="ball" type="ball" range="0 0.8"/>
+    <geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0"/></body></worldbody></mujoco>"""
+    alone = wb.load(written(tmp_path, text))
+    turned = np.array([0.0, 0.0, 1.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])  # by 90 degrees about z
+    hand = wb.load("hand")
+    beside = wb.Scene({"one": (alone, turned), "other": alone}).figure
+    held = hand.mounted(alone, on="right_palm", name="one", at=turned)
+    for figure, prefix in ((alone, ""), (beside, "one/"), (beside, "other/"), (held, "one/")):
+        problem = wb.Problem(wb.Scene(figure), constraints=[wb.tasks.ReachCones()])
+        joint = figure.model.joints[figure.joint_id(f"{prefix}ball")]
+        for axis in np.eye(3)[1:]:
+            for angle, inside in ((0.7, True), (0.9, False)):
+                q = figure.neutral.copy()
+                q[joint.idx_q : joint.idx_q + 4] = pin.Quaternion(pin.exp3(angle * axis)).coeffs()
+                assert (wb.assess(problem, q).constraint_violation < 1e-9) == inside
+
+
 def test_one_of_several_robots_is_chosen(tmp_path: Path) -> None:
     second = '<body name="other" pos="1 0 0"><joint name="turn"/><geom size="0.1"/></body></worldbody>'
     path = written(tmp_path, ARM.replace("</worldbody>", second))

@@ -249,8 +249,8 @@ class RobotBuilder:
             cone = ReachCone(corners @ place.T, place[:, 2])
             made[name] = JointCone(cone, reference, self._file.names["body"][body], limb)
             self._notes.append(
-                f"joint {shown(name)}: its range of {np.degrees(angle):.1f} degrees is kept for the swing of its limb, "
-                "and not for the twist about it"
+                f"joint {shown(name)}: its range of {np.degrees(angle):.1f} degrees is that of the swing of its limb "
+                "in wb.tasks.ReachCones; the twist about it has none"
             )
         return made
 
