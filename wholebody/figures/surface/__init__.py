@@ -6,6 +6,7 @@ import hashlib
 from functools import lru_cache
 from typing import Any
 
+from wholebody.base.arrays import with_values
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import urdf_text
 from wholebody.figures.figure import Figure
@@ -39,5 +40,5 @@ def _kept(person: Person, hand: str) -> Surface:
     # The number is another one whenever a shape, a weight or the layout changes.
     digest = hashlib.sha256(f"34 {hand} {person!r} {urdf_text(human_spec(person))}".encode())
     bones, patches = cached_entry(digest.hexdigest(), make)
-    bones = [Bone(*each)._replace(turn=Turn(*each[-1])) for each in bones]
+    bones = [with_values(Bone(*each), turn=Turn(*each[-1])) for each in bones]
     return Surface(tuple(bones), tuple(Patch(*each) for each in patches))

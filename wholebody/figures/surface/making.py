@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.hand import FINGERS, PARTS
 from wholebody.figures.surface.garments import Bone, Claim, Garment, Patch, Surface, bounds, halfway
@@ -43,7 +43,7 @@ def person_parts(person: Person) -> tuple[dict[str, Bone], list[Part]]:
             for kind, turn in shape.turns(side, part).items():
                 bone = Bone(segment, other, None, np.eye(4), np.eye(4), shape.slide(side, part), turn)
                 bind = halfway(shape.bind[other], shape.bind[segment], bone)
-                bones[f"{segment}/{kind}"] = bone._replace(bind=bind)
+                bones[f"{segment}/{kind}"] = with_values(bone, bind=bind)
         hand, frame = hand_shape(person, side), shape.bind[f"{side}_hand"]
         for finger, parts in FINGERS.items():
             for part in parts:
