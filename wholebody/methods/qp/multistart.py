@@ -294,7 +294,7 @@ class QPMultistart(Search):
             self._lower(q)
 
     def _below_things(self, others: Iterable[Array]) -> float:
-        """Seek a lower minimum beside one through things, from the best or others; their least measures, 0 if unknown."""
+        """Seek a lower minimum beside one through things, from the best or others; their least measures, else 0."""
         less = SEARCH.less_of_contacts if self._touches else SEARCH.less
         through, best = self._through(self.best.q, less), self.best.measure
         for q in () if through.measure < less * best else others:
