@@ -170,8 +170,9 @@ def retarget(
                 tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
                 if over < STUCK:
                     break
-            held_on = len(tries[0][3].given_up)  # a second try that lets go of more is none
-            _, q, depths, holds = min((one for one in tries if len(one[3].given_up) <= held_on), key=lambda one: one[0])
+            # a second try that lets go of a tenth of all contacts more is none
+            most = len(tries[0][3].given_up) + 0.1 * sum(one.end - one.first for one in contacts)
+            _, q, depths, holds = min((one for one in tries if len(one[3].given_up) <= most), key=lambda one: one[0])
             lost = holds.let_go(q)
             inside = _said_inside(alone.fitter, holds, q, depths)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)
