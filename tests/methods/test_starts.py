@@ -175,6 +175,22 @@ def test_who_sits_is_over_the_seat_in_eight_directions_and_what_is_frozen_stays(
         assert figure.placement(q, "anna/pelvis").isApprox(figure.placement(problem.start, "anna/pelvis"), 1e-9)
 
 
+def test_two_people_take_two_chairs() -> None:
+    """With one person on a chair at a time no start met half of the goals: the other was said to be out of reach."""
+    people = {"anna": wb.load("human", percentile=30), "ben": (wb.load("human", percentile=70), (0.0, -0.9, 0.0))}
+    scene = wb.Scene(people).add(wb.HalfSpace(), name="floor")
+    for name, y in (("anna", 0.6), ("ben", -0.8)):
+        scene.add(wb.Box((0.45, 0.5, 0.05)), name=f"chair of {name}", at=(0.0, y, 0.42))
+    goals = [wb.Sit(f"chair of {name}", pelvis=f"{name}/pelvis", trunk=f"{name}/thorax") for name in ("anna", "ben")]
+    problem = wb.Problem(scene, goals=goals)
+    with problem.borrow() as workspace:
+        found = list(seated(problem, workspace.state, problem.start))
+    on = [[abs(scene.figure.placement(q, f"{name}/pelvis").translation[1] - y) < 0.05
+           for name, y in (("anna", 0.6), ("ben", -0.8))] for q in found]  # fmt: skip
+    assert [tuple(each) for each in on] == [(True, False)] * 8 + [(False, True)] * 8 + [(True, True)] * 8
+    assert wb.solve(problem).status == "solved"
+
+
 def test_who_sits_on_a_floor_begins_where_the_start_is() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     problem = wb.Problem(scene, goals=[wb.Sit("floor")])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -150,9 +151,10 @@ def crouched(problem: Problem, state: State, start: Array) -> Array | None:
 def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> Iterator[Array]:
     """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn.
 
-    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be.
+    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Of several who sit
+    one after the other does, then all at once, each turned by as much.
     """
-    figure = problem.scene.figure
+    figure, moves = problem.scene.figure, list[list[Array]]()
     terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if isinstance(term, Sit)]
     for term in terms:
         body = body_of(problem.scene, [term.pelvis])
@@ -165,12 +167,16 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> 
         middle, axes = face.at(state.update(start))
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
         at = middle + high * axes[2]
+        moves.append([])
         for yaw in np.arange(8) * 0.25 * np.pi:
             turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3))
             way = axes[:2] @ turn.rotation[:, 0]
             edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
             root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
-            yield _moved(problem, state, start, _to_posture(problem, start, body, "sitting", root))
+            moves[-1].append(_to_posture(problem, start, body, "sitting", root))
+    together = [np.sum(each, axis=0) for each in zip(*moves, strict=True)] if len(moves) > 1 else []
+    for move in (*chain.from_iterable(moves), *together):
+        yield _moved(problem, state, start, move)
 
 
 def _root_at(problem: Problem, q: Array, body: str | None, posture: str = "") -> pin.SE3 | None:
