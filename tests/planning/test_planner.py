@@ -218,14 +218,40 @@ def test_a_path_of_an_arm_whose_tip_is_held_is_drawn_tight(planar_arm: Callable[
         steps = TrackedMotions(problem, workspace)
         steps.admit(start)
         for _ in range(3):
-            path += steps.towards(path[-1], start + rng.normal(0.0, 0.5, 4))[0]
-        found = tighten(figure.model, path, steps, steps)
+            path += steps.geodesics.towards(path[-1], start + rng.normal(0.0, 0.5, 4))[0]
+        found = tighten(figure.model, path, steps.geodesics, steps)
     straight = length(figure.model, [path[0], path[-1]])
     assert length(figure.model, path) > 1.5 * straight
     assert straight <= length(figure.model, found) < 1.15 * straight
     held = figure.placement(start, tip).translation
     missed = [np.linalg.norm(figure.placement(q, tip).translation - held) for q in found]
     assert np.max(missed) < 1e-4
+
+
+def test_feet_that_are_held_on_a_floor_let_a_body_move(human: wb.Figure, least_distance: Distance) -> None:
+    """Between two postures of a step feet get into the floor by its square, which ends no motion."""
+    scene, start = wb.Scene(human), human.posture("standing")
+    scene.add(wb.HalfSpace(), name="floor")
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    problem = wb.Problem(scene, start, constraints=[*feet, wb.Balance()])
+    rng, path = np.random.default_rng(1), [start]
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        local = steps.geodesics
+        steps.admit(start)
+        for _ in range(3):
+            away = rng.normal(0.0, 0.3, human.model.nv)
+            away[:6] = 0.0
+            path += local.towards(path[-1], human.clamp(pin.integrate(human.model, start, away)))[0]
+        found = tighten(human.model, path, local, steps)
+        assert all(local.follows(*pair) for pair in pairwise(found))
+    straight = length(human.model, [path[0], path[-1]])
+    assert length(human.model, path) > 1.5 * straight > 0.3
+    assert length(human.model, found) < 1.1 * straight
+    for foot in ("left_foot", "right_foot"):
+        places = [human.placement(q, foot).translation for q in found]
+        assert np.ptp(places, axis=0).max() < 1e-4
+    assert min(least_distance(scene, q) for q in found) > -1e-4
 
 
 class HitLate(wb.Goal):

@@ -169,9 +169,9 @@ def _halved(model: pin.Model, band: list[Array], cut: Sequence[bool], local: Loc
     inner = [False, *cut[1:-1], False]
     for (q, there), beside in zip(pairwise(band), map(any, pairwise(inner)), strict=True):
         if beside and length(model, [q, there]) > 0.1:  # rad, m: smaller = nearer to things, dearer
-            way = local.joined(q, there, np.inf)  # one on it is free, which the middle that is projected need not be
-            middle = len(way) // 2 - 1
-            found.append(way[middle] if way[1:] else local.projected(np.asarray(pin.interpolate(model, q, there, 0.5))))
+            middle = local.projected(np.asarray(pin.interpolate(model, q, there, 0.5)))
+            if local.joined(q, middle, np.inf) and local.joined(middle, there, np.inf):  # motions may be nearer to things
+                found.append(middle)
         found.append(there)
     return found
 
