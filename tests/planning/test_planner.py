@@ -228,12 +228,37 @@ def test_a_path_of_an_arm_whose_tip_is_held_is_drawn_tight(planar_arm: Callable[
     assert np.max(missed) < 1e-4
 
 
-def test_feet_that_are_held_on_a_floor_let_a_body_move(human: wb.Figure, least_distance: Distance) -> None:
+def test_feet_that_are_held_on_a_floor_let_a_body_move(human: wb.Figure) -> None:
     """Between two postures of a step feet get into the floor by its square, which ends no motion."""
+    scene, start, model = wb.Scene(human), human.posture("standing"), human.model
+    scene.add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(scene, start, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()])
+    toes = [joint.idx_v for joint, name in zip(model.joints, model.names, strict=True) if "mtp" in name]
+    rng, followed = np.random.default_rng(0), []
+    with problem.borrow() as workspace:
+        local = ProjectedMotions(problem, workspace)
+        local.admit(start)
+
+        def beside(q: Array, by: float) -> Array:
+            away = rng.uniform(-by, by, model.nv)
+            away[toes], away[2] = 0.0, -abs(away[2])  # a standing body gets no higher
+            return local.projected(human.clamp(np.asarray(pin.integrate(model, q, away))))
+
+        for _ in range(40):
+            q = beside(start, 0.1)
+            there = beside(q, 0.05)
+            if local.free(q) and local.free(there):
+                followed.append(local.follows(q, there))
+    assert len(followed) > 4
+    assert all(followed)
+
+
+def test_a_path_of_a_body_whose_feet_are_held_is_drawn_tight(human: wb.Figure, least_distance: Distance) -> None:
+    """What is held is kept by the program; postures that are added to it are joined to the others."""
     scene, start = wb.Scene(human), human.posture("standing")
     scene.add(wb.HalfSpace(), name="floor")
-    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    problem = wb.Problem(scene, start, constraints=[*feet, wb.Balance()])
+    held = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()]
+    problem = wb.Problem(scene, start, constraints=held)
     rng, path = np.random.default_rng(1), [start]
     with problem.borrow() as workspace:
         steps = TrackedMotions(problem, workspace)
@@ -242,7 +267,7 @@ def test_feet_that_are_held_on_a_floor_let_a_body_move(human: wb.Figure, least_d
         for _ in range(3):
             away = rng.normal(0.0, 0.3, human.model.nv)
             away[:6] = 0.0
-            path += local.towards(path[-1], human.clamp(pin.integrate(human.model, start, away)))[0]
+            path += local.towards(path[-1], human.clamp(np.asarray(pin.integrate(human.model, start, away))))[0]
         found = tighten(human.model, path, local, steps)
         assert all(local.follows(*pair) for pair in pairwise(found))
     straight = length(human.model, [path[0], path[-1]])

@@ -96,14 +96,14 @@ def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, dam
 
 
 class Spread(NamedTuple):
-    """What forces on the postures of a path displace, with what is held: a matrix of three bands of blocks, factored."""
+    """What forces on the postures of a path displace, with what is held: a matrix of bands of blocks, factored."""
 
     inverses: Array  # (n, nv, nv) of each block less what is eliminated before it
     beside: Array  # (n - 1,) how stiff displacements of neighbours are joined
 
     def displaced(self, forces: Array) -> Array:
         """Displacements (n, nv, r) by forces (n, nv, r)."""
-        found = forces.copy()
+        found: Array = forces.copy()
         for k in range(1, len(found)):
             found[k] += self.beside[k - 1] * (self.inverses[k - 1] @ found[k - 1])
         for k in range(len(found) - 1, -1, -1):
@@ -170,7 +170,7 @@ def _halved(model: pin.Model, band: list[Array], cut: Sequence[bool], local: Loc
     for (q, there), beside in zip(pairwise(band), map(any, pairwise(inner)), strict=True):
         if beside and length(model, [q, there]) > 0.1:  # rad, m: smaller = nearer to things, dearer
             middle = local.projected(np.asarray(pin.interpolate(model, q, there, 0.5)))
-            if local.joined(q, middle, np.inf) and local.joined(middle, there, np.inf):  # motions may be nearer to things
+            if local.joined(q, middle, np.inf) and local.joined(middle, there, np.inf):  # these may be nearer
                 found.append(middle)
         found.append(there)
     return found
