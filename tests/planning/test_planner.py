@@ -233,7 +233,7 @@ def test_feet_that_are_held_on_a_floor_let_a_body_move(human: wb.Figure) -> None
     scene, start, model = wb.Scene(human), human.posture("standing"), human.model
     scene.add(wb.HalfSpace(), name="floor")
     problem = wb.Problem(scene, start, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()])
-    toes = [joint.idx_v for joint, name in zip(model.joints, model.names, strict=True) if "mtp" in name]
+    toes = [joint.idx_v for joint, name in zip(model.joints, model.names, strict=True) if "toe" in name]
     rng, followed = np.random.default_rng(0), []
     with problem.borrow() as workspace:
         local = ProjectedMotions(problem, workspace)
