@@ -219,8 +219,8 @@ def test_a_path_of_an_arm_whose_tip_is_held_is_drawn_tight(planar_arm: Callable[
         steps = TrackedMotions(problem, workspace)
         steps.admit(start)
         for _ in range(3):
-            path += steps.towards(path[-1], start + rng.normal(0.0, 0.5, 4))[0]
-        found = tighten(figure.model, path, steps, steps)
+            path += steps.geodesics.towards(path[-1], start + rng.normal(0.0, 0.5, 4))[0]
+        found = tighten(figure.model, path, steps.geodesics, steps)
     straight = length(figure.model, [path[0], path[-1]])
     assert length(figure.model, path) > 1.5 * straight
     assert straight <= length(figure.model, found) < 1.15 * straight
@@ -245,6 +245,57 @@ def test_no_motion_is_looked_at_after_the_time_limit(
     figure = planar_arm((0.5, 0.5))
     assert not wb.plan(wb.Scene(figure), None, figure.neutral + 1.0, time_limit=0.3).solved
     assert seen == [False]
+
+
+def test_feet_that_are_held_on_a_floor_let_a_body_move(human: wb.Figure) -> None:
+    """Between two postures of a step feet get into the floor by its square, which ends no motion."""
+    scene, start, model = wb.Scene(human), human.posture("standing"), human.model
+    scene.add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(scene, start, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()])
+    toes = [joint.idx_v for joint, name in zip(model.joints, model.names, strict=True) if "toe" in name]
+    rng, followed = np.random.default_rng(0), []
+    with problem.borrow() as workspace:
+        local = ProjectedMotions(problem, workspace)
+        local.admit(start)
+
+        def beside(q: Array, by: float) -> Array:
+            away = rng.uniform(-by, by, model.nv)
+            away[toes], away[2] = 0.0, -abs(away[2])  # a standing body gets no higher
+            return local.projected(human.clamp(np.asarray(pin.integrate(model, q, away))))
+
+        for _ in range(40):
+            q = beside(start, 0.1)
+            there = beside(q, 0.05)
+            if local.free(q) and local.free(there):
+                followed.append(local.follows(q, there))
+    assert len(followed) > 4
+    assert all(followed)
+
+
+def test_a_path_of_a_body_whose_feet_are_held_is_drawn_tight(human: wb.Figure, least_distance: Distance) -> None:
+    """What is held is kept by the program; postures that are added to it are joined to the others."""
+    scene, start = wb.Scene(human), human.posture("standing")
+    scene.add(wb.HalfSpace(), name="floor")
+    held = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()]
+    problem = wb.Problem(scene, start, constraints=held)
+    rng, path = np.random.default_rng(1), [start]
+    with problem.borrow() as workspace:
+        steps = TrackedMotions(problem, workspace)
+        local = steps.geodesics
+        steps.admit(start)
+        for _ in range(3):
+            away = rng.normal(0.0, 0.3, human.model.nv)
+            away[:6] = 0.0
+            path += local.towards(path[-1], human.clamp(np.asarray(pin.integrate(human.model, start, away))))[0]
+        found = tighten(human.model, path, local, steps)
+        assert all(local.follows(*pair) for pair in pairwise(found))
+    straight = length(human.model, [path[0], path[-1]])
+    assert length(human.model, path) > 1.5 * straight > 0.3
+    assert length(human.model, found) < 1.1 * straight
+    for foot in ("left_foot", "right_foot"):
+        places = [human.placement(q, foot).translation for q in found]
+        assert np.ptp(places, axis=0).max() < 1e-4
+    assert min(least_distance(scene, q) for q in found) > -1e-4
 
 
 class HitLate(wb.Goal):

@@ -50,6 +50,7 @@ class Geodesics:
     rounds: ClassVar[int] = 50  # samples of trees until they get another end
     tries: ClassVar[int] = 30  # shortcuts in a row that fail; more = shorter paths, later
     spacing: ClassVar[float] = 0.03  # rad, m: between postures that are smoothed; smaller = nearer to the path, dearer
+    bent: ClassVar[float] = 0.0  # m: by which pairs that are near at an end may come nearer between two postures
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._workspace, self._model = workspace, workspace.model
@@ -95,7 +96,7 @@ class Geodesics:
         number, distance = near.number, near.distance - NOISE
         required = np.minimum((self._least + self._kept.room)[number], distance)
         # nothing is nearer between two postures than at an end, but for what a frame may miss
-        self._least[number] = np.minimum(self._least[number], distance - MISSED)
+        self._least[number] = np.minimum(self._least[number], distance - MISSED - self.bent)
         self._kept.room[number] = required - self._least[number]
         self._followed.room[number] = 0.5 * self._kept.room[number]
         values = self._values.at(self._workspace.state)

@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.control import BUDGET
-from wholebody.planning.local_planner import Geodesics, Kept
+from wholebody.planning.local_planner import MARGIN, Geodesics, Kept
 from wholebody.planning.projection_kernel import displace
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -35,6 +35,7 @@ class ProjectedMotions(Geodesics):
     rounds: ClassVar[int] = 50
     tries: ClassVar[int] = 25
     spacing: ClassVar[float] = 0.04
+    bent: ClassVar[float] = MARGIN  # feet that are held get into the floor by the square of a step
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         super().__init__(problem, workspace)

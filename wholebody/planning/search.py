@@ -50,8 +50,7 @@ class Search:
         self._bodily = free_root and self._local is not self._slides
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
-        # programs of a body that holds something have thousands of rows
-        self._tightens = self._local is not self._slides and not (self._held and problem.scene.figure.roots)
+        self._tightens = self._local is not self._slides
         self._again = HELD_AGAIN if self._held else AGAIN
         self._straight, self._until = False, self._again
 
@@ -108,7 +107,7 @@ class Search:
             # most of the remaining time is for smoothing
             with within_budget(0.3 * left):
                 tight = tighten(model, path, self._local, self._slides)
-            best = min(path, tight, key=lambda each: length(model, each))
+            best = tight if length(model, tight) < length(model, path) and self._proven(tight) else path
             if length(model, best) > 0.97 * length(model, path):  # it counts as tight
                 found.append(best)
             else:

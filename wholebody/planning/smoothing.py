@@ -71,15 +71,17 @@ def _together(model: pin.Model, freedom: int, rng: np.random.Generator) -> list[
 
 
 def banded(model: pin.Model, path: list[Array], local: LocalPlanner) -> list[Array]:
-    """Postures of a path about `APART`, and its own ones between two of them that a straight motion does not join."""
+    """Postures of a path about `APART`, nearer ones where straight motions do not join these."""
     at = _lengths(model, path)
     places = np.linspace(0.0, at[-1], max(4, int(np.ceil(at[-1] / APART)) + 1))
-    even, found = resampled(model, path, len(places)), [path[0]]
-    for (low, high), there in zip(pairwise(places), even[1:], strict=True):
-        q = local.projected(there)
-        if not local.joined(found[-1], q, np.inf):
-            found += [path[k] for k in np.flatnonzero((low < at) & (at < high))]
-        found.append(q)
+    chosen, found, here = np.unique(np.abs(at[:, None] - places).argmin(axis=0)), [path[0]], 0
+    for there in chosen[1:].tolist():
+        while here < there:
+            ahead = there
+            while ahead > here + 1 and not local.joined(path[here], path[ahead], np.inf):
+                ahead = (here + ahead + 1) // 2
+            found.append(path[ahead])
+            here = ahead
     return found
 
 

@@ -25,9 +25,10 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.smoothing import banded, length
-from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
+from wholebody.planning.tracked_motions import LocalPlanner, Rows, TrackedMotions
 
 DAMPING = 0.005  # m of the first program, and least; larger = shorter displacements, more programs
+HELD = 1e3  # of what is held: larger = nearer to it; projections make up for the rest
 
 
 class Program(NamedTuple):
@@ -64,24 +65,29 @@ def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: Tr
 
 def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, damping: float) -> Program | None:
     """The program of a path as it is; None where time ends before."""
-    turns, rows, gaps, counts = [_turn(model, q) for q in band], list[Array](), list[Array](), list[int]()
+    turns, rows, counts = [_turn(model, q) for q in band], list[Rows](), list[int]()
     for q, turn in zip(band[1:-1], turns[1:-1], strict=True):
         if BUDGET.over:
             return None
-        row, gap = slides.rows(q)
-        rows.append(row @ turn.T)
-        gaps.append(gap)
-        counts.append(len(gap))
+        each = slides.rows(q)
+        rows.append(each._replace(derivative=each.derivative @ turn.T, held=each.held @ turn.T))
+        counts.append(len(each.gap))
     ways = np.array([turn @ pin.difference(model, *pair) for turn, pair in zip(turns, pairwise(band), strict=False)])
     lengths = np.linalg.norm(ways, axis=1)
     if not lengths.any():  # it stays
         return None
     weights = lengths.mean() / np.maximum(lengths, 0.3 * lengths.mean())  # bounded where a motion is short
-    stiff = np.diag(weights[:-1] + weights[1:] + damping) - np.diag(weights[1:-1], 1) - np.diag(weights[1:-1], -1)
-    spread = np.linalg.inv(stiff)
-    free = spread @ (weights[1:, None] * ways[1:] - weights[:-1, None] * ways[:-1])
+    pull = weights[1:, None] * ways[1:] - weights[:-1, None] * ways[:-1]
+    pull -= HELD * np.array([each.held.T @ each.missed for each in rows])
+    # of nodes by those before them, as displacements are eliminated from the start on
+    inverses = list[Array]()
+    for k, each in enumerate(rows):
+        stiff = (weights[k] + weights[k + 1] + damping) * np.eye(model.nv) + HELD * each.held.T @ each.held
+        inverses.append(np.linalg.inv(stiff - weights[k] ** 2 * inverses[-1] if k else stiff))
     node = np.repeat(np.arange(len(counts)), counts)
-    away = _kept(free, spread, node, (np.concatenate(rows), np.concatenate(gaps)))
+    spread = Spread(np.array(inverses), weights[1:-1])
+    listed = np.concatenate([each.derivative for each in rows]), np.concatenate([each.gap for each in rows])
+    away = _kept(pull, spread, node, listed)
     # rad, m: farther ones lead to things that no row is of
     away *= min(1.0, 0.4 / max(float(np.linalg.norm(away, axis=1).max()), 1e-15))
     ends = np.zeros((1, model.nv))
@@ -89,20 +95,38 @@ def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, dam
     return Program(away, turns, float(lengths.sum() - after.sum()))
 
 
-def _kept(free: Array, spread: Array, node: Indices, rows: tuple[Array, Array]) -> Array:
-    """Displacements (n, nv) that keep rows (r, nv) with gaps (r,), of nodes (r,), nearest to others that need not."""
+class Spread(NamedTuple):
+    """What forces on the postures of a path displace, with what is held: a matrix of bands of blocks, factored."""
+
+    inverses: Array  # (n, nv, nv) of each block less what is eliminated before it
+    beside: Array  # (n - 1,) how stiff displacements of neighbours are joined
+
+    def displaced(self, forces: Array) -> Array:
+        """Displacements (n, nv, r) by forces (n, nv, r)."""
+        found: Array = forces.copy()
+        for k in range(1, len(found)):
+            found[k] += self.beside[k - 1] * (self.inverses[k - 1] @ found[k - 1])
+        for k in range(len(found) - 1, -1, -1):
+            ahead = found[k] + self.beside[k] * found[k + 1] if k < len(self.beside) else found[k]
+            found[k] = self.inverses[k] @ ahead
+        return found
+
+
+def _kept(pull: Array, spread: Spread, node: Indices, rows: tuple[Array, Array]) -> Array:
+    """Displacements (n, nv) by forces (n, nv) that keep rows (r, nv) with gaps (r,), of nodes (r,)."""
     derivative, gap = rows
+    free = found = spread.displaced(pull[:, :, None])[:, :, 0]
     ahead = np.einsum("ij,ij->i", derivative, free[node]) + gap
-    force, found, asked = np.zeros(len(gap)), free, ahead < 0.0
+    force, asked = np.zeros(len(gap)), ahead < 0.0
     for _ in range(6):  # the last ones seldom find more
         at = np.flatnonzero(asked)
-        response = spread[np.ix_(node[at], node[at])] * (derivative[at] @ derivative[at].T)
+        forces = np.zeros((*free.shape, len(at)))
+        forces[node[at], :, np.arange(len(at))] = derivative[at]
+        moved = spread.displaced(forces)
         given = force[at]
-        projected_gauss_seidel(response, ahead[at], given)
+        projected_gauss_seidel(np.einsum("ij,ijk->ik", derivative[at], moved[node[at]]), ahead[at], given)
         force[at] = given
-        pushed = np.zeros_like(free)
-        np.add.at(pushed, node[at], given[:, None] * derivative[at])
-        found = free + spread @ pushed
+        found = free + moved @ given
         missed = np.einsum("ij,ij->i", derivative, found[node]) + gap < -1e-4
         if not (missed & ~asked).any():
             break
@@ -145,7 +169,9 @@ def _halved(model: pin.Model, band: list[Array], cut: Sequence[bool], local: Loc
     inner = [False, *cut[1:-1], False]
     for (q, there), beside in zip(pairwise(band), map(any, pairwise(inner)), strict=True):
         if beside and length(model, [q, there]) > 0.1:  # rad, m: smaller = nearer to things, dearer
-            found.append(local.projected(np.asarray(pin.interpolate(model, q, there, 0.5))))
+            middle = local.projected(np.asarray(pin.interpolate(model, q, there, 0.5)))
+            if local.joined(q, middle, np.inf) and local.joined(middle, there, np.inf):  # these may be nearer
+                found.append(middle)
         found.append(there)
     return found
 

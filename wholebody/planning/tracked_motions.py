@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import ClassVar, TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +11,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.control import BUDGET
 from wholebody.methods.qp.method import QP
-from wholebody.planning.local_planner import MARGIN, NOISE, Geodesics
+from wholebody.planning.local_planner import INSIDE, MARGIN, NOISE, Geodesics
 from wholebody.planning.projected_motions import ProjectedMotions
 from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
@@ -22,6 +22,15 @@ REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by st
 # share of the weight that all but the place of a root has while that is pulled; larger = gets stuck, smaller = ends far
 # from the target
 LOOSE = 0.1
+
+
+class Rows(NamedTuple):
+    """Displacements x of a posture by which ``gap + derivative @ x`` is not negative keep what is near."""
+
+    derivative: Array  # (r, nv)
+    gap: Array  # (r,)
+    held: Array  # (e, nv) derivatives of what is held
+    missed: Array  # (e,) by how much that is missed
 
 
 class TrackedMotions:
@@ -98,21 +107,22 @@ class TrackedMotions:
         found: Array = self._tracker.step(q).q
         return found if self.geodesics.keeps(found) else self._settling.step(found, measures=False).q
 
-    def rows(self, q: Array) -> tuple[Array, Array]:
-        """Rows (r, nv) and gaps (r,) of what is near q (nq,), of constraints and limits.
-
-        Displacements x by which ``gap + rows @ x`` is not negative keep them; what is missed has a gap of 0.
-        """
+    def rows(self, q: Array) -> Rows:
+        """What is near q (nq,), of constraints and limits; what is missed has a gap of 0."""
         self._lineariser.take((), self._resting.clearances)
         at = self._lineariser.at(q, 0.08)  # m: farther = more rows, fewer displacements that are cut
         sides, each = self.geodesics.sides, np.eye(self._model.nv)
+        held = sides[1] - sides[0] < INSIDE
+        low, high = sides[:, ~held]
+        value, derivative = at.value[~held], at.value_jacobian[~held]
         gaps = np.concatenate([
             at.gap - at.clearance - 1e-3,  # m: rows are straight, and distances are not
-            at.value - sides[0], sides[1] - at.value, -at.lower, at.upper,
+            value - low, high - value, -at.lower, at.upper,
         ])  # fmt: skip
-        rows = np.concatenate([at.gap_jacobian, at.value_jacobian, -at.value_jacobian, each, -each])
+        rows = np.concatenate([at.gap_jacobian, derivative, -derivative, each, -each])
         counts = gaps < 1.0  # rad, m: farther than any displacement
-        return rows[counts], np.maximum(gaps[counts], 0.0)
+        missed = at.value[held] - sides[:, held].mean(axis=0)
+        return Rows(rows[counts], np.maximum(gaps[counts], 0.0), at.value_jacobian[held], missed)
 
     def displaced(self, q: Array, away: Array) -> Array:
         """The posture (nq,) that is displaced from q by a tangent (nv,), within limits."""
