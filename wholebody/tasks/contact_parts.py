@@ -341,5 +341,5 @@ def _approached(part: Any, distance: float) -> Any:
         return part
     whole, normal = part.face.surface, part.face.axes[2]
     space = coal.Halfspace(normal, float(normal @ part.face.center) + distance)
-    plane = with_values(whole, pieces=whole.pieces[:1], joints=whole.joints[:1])
+    plane = with_values(whole, pieces=whole.pieces[:1], joints=whole.joints[:1], flesh=())
     return with_values(part, second=plane.with_shapes((space,)))

@@ -9,6 +9,7 @@ import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.methods import control
 from wholebody.methods.qp.method import QP
+from wholebody.tasks.contact_parts import approached
 from wholebody.tasks.touch import on_its_side
 
 
@@ -96,3 +97,11 @@ def test_feet_get_onto_rungs_that_they_begin_under() -> None:
     assert solution.solved, solution
     for side, number in (("left", 1), ("right", 2)):
         assert scene.figure.placement(solution.q, f"{side}_ball").translation[2] > 0.28 * number
+
+
+def test_the_plane_of_a_face_of_flesh_spreads_no_more() -> None:
+    """Thighs spread on seats; in front of one the place of a piece was set that its plane has not: an IndexError."""
+    scene = wb.Scene({"anna": wb.load("human", percentile=20), "ben": (wb.load("human"), (0.0, -1.2, 0.0))})
+    goal = wb.Sit("ben/left_thigh", pelvis="anna/pelvis", trunk="anna/thorax")
+    ahead = approached(goal.resolve(scene, scene.figure.neutral), 0.01)
+    assert np.isfinite(ahead.error(scene.state(scene.figure.neutral))).all()
