@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.smoothing import banded, length
@@ -70,7 +70,7 @@ def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, dam
         if BUDGET.over:
             return None
         each = slides.rows(q)
-        rows.append(each._replace(derivative=each.derivative @ turn.T, held=each.held @ turn.T))
+        rows.append(with_values(each, derivative=each.derivative @ turn.T, held=each.held @ turn.T))
         counts.append(len(each.gap))
     ways = np.array([turn @ pin.difference(model, *pair) for turn, pair in zip(turns, pairwise(band), strict=False)])
     lengths = np.linalg.norm(ways, axis=1)
