@@ -104,8 +104,8 @@ class Search:
             # a path that there is no time to smooth stops at its corners, and is judged three times as long
             if left < 0.2:  # s: a body's smoothing takes as long
                 break
-            # most of the remaining time is for smoothing
-            with within_budget(0.3 * left):
+            # most of the remaining time is for smoothing and the last program, which ends late
+            with within_budget(0.2 * left):
                 tight = tighten(model, path, self._local, self._slides)
             best = tight if length(model, tight) < length(model, path) and self._proven(tight) else path
             if length(model, best) > 0.97 * length(model, path):  # it counts as tight

@@ -71,16 +71,16 @@ def _together(model: pin.Model, freedom: int, rng: np.random.Generator) -> list[
 
 
 def banded(model: pin.Model, path: list[Array], local: LocalPlanner) -> list[Array]:
-    """Postures of a path about `APART`, nearer ones where straight motions do not join these."""
-    at = _lengths(model, path)
+    """Postures of a path about `APART`, and nearer ones between two of them that a straight motion does not join."""
+    at, found, dear = _lengths(model, path), [path[0]], model.nv > 20  # a posture of a body costs as ten of an arm
     places = np.linspace(0.0, at[-1], max(4, int(np.ceil(at[-1] / APART)) + 1))
-    chosen, found, here = np.unique(np.abs(at[:, None] - places).argmin(axis=0)), [path[0]], 0
-    for there in chosen[1:].tolist():
+    for here, there in pairwise(np.unique(np.abs(at[:, None] - places).argmin(axis=0)).tolist()):
         while here < there:
             ahead = there
-            while ahead > here + 1 and not local.joined(path[here], path[ahead], np.inf):
+            while dear and ahead > here + 1 and not local.joined(path[here], path[ahead], np.inf):
                 ahead = (here + ahead + 1) // 2
-            found.append(path[ahead])
+            alone = dear or bool(local.joined(path[here], path[ahead], np.inf))
+            found += [path[ahead]] if alone else path[here + 1 : there + 1]
             here = ahead
     return found
 
