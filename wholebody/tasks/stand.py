@@ -158,7 +158,7 @@ class Stance(SumOfSquares):
         factors: (5,) roots of the weights.
 
     Raises:
-        InputError: a value of the wrong kind, shape or range.
+        InputError: a value of the wrong kind, shape or range; in a problem, a figure of which nothing has mass.
         UnknownNameError: in a problem, a segment that the figure does not have.
 
     Examples:
