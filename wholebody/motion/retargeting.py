@@ -171,8 +171,10 @@ def retarget(
                 if over < STUCK:
                     break
             # a second try that lets go of a tenth of all contacts more is none
-            most = len(tries[0][3].given_up) + 0.1 * sum(one.end - one.first for one in contacts)
-            _, q, depths, holds = min((one for one in tries if len(one[3].given_up) <= most), key=lambda one: one[0])
+            lost_most = len(tries[0][3].given_up) + 0.1 * sum(one.end - one.first for one in contacts)
+            _, q, depths, holds = min(
+                (one for one in tries if len(one[3].given_up) <= lost_most), key=lambda one: one[0]
+            )
             lost = holds.let_go(q)
             inside = _said_inside(alone.fitter, holds, q, depths)
     clip = Clip(figure, q, motion.dt, motion.name, tracks)

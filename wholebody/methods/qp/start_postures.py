@@ -70,7 +70,7 @@ def before_contact(
             q = local.q
         return local
 
-    # most descents, of which the first is from the start; of a driver in 30 one in ten is met; fingers close slowly
+    # descents from the start and from others, at most; of a driver in 30 one in ten is met; fingers close slowly
     count = 3 if grips else 24
     others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
