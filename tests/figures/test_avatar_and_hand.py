@@ -63,7 +63,7 @@ def test_hand_is_fifteen_polyhedra_of_a_hundred_triangles(side):
         points = np.array(piece.geometry.points())
         half = np.ptp(points, axis=0) / 2
         assert piece.geometry.computeVolume() / (4 / 3 * np.pi * half.prod()) == pytest.approx(0.9, abs=0.06)
-    assert len(hand.joints) == 18
+    assert len(hand.joints) == 20
     assert hand.root == "free"
 
 

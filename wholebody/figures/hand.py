@@ -1,7 +1,7 @@
 """The hand: fifteen ellipsoids, each a polyhedron of a hundred triangles, on a free root at the wrist (Schmidl & Lin).
 
 The hand's frame is that of the person's hand: fingers along -z, thumb towards +x, palm towards -y on the left and +y on
-the right. The root of the thumb is fixed at its resting placement, so that the thumb has two parts.
+the right. The metacarpal of the thumb moves within the palm's ellipsoid and is no part of its own.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
     size = Dimensions(person)
     parts = tuple(finger_parts(size, side))
     joints = finger_joints(side, parts)
-    keys = {f"{side}_hand": "palm", **{part.segment: part.key for part in parts}}
+    keys = {f"{side}_hand": "palm", **{part.segment: part.key for part in parts if part.key != "thumb_mc"}}
     return BodySpec(
         name=f"{side}_hand",
         title=f"{side} hand; {describe(person)}",
@@ -131,15 +131,13 @@ class FingerPart(NamedTuple):
     origin: pin.SE3  # of its first joint in that
 
 
-def finger_parts(size: Dimensions, side: str, *, thumb_root: bool = False) -> Iterator[FingerPart]:
+def finger_parts(size: Dimensions, side: str) -> Iterator[FingerPart]:
     """The parts of the fingers of a hand; that of the thumb's metacarpal too if it moves."""
     for finger, names in FINGERS.items():
         parent, origin = f"{side}_hand", pin.SE3(np.eye(3), _knuckle(size, finger))
-        if finger == "thumb" and thumb_root:  # it rests where the table has its abduction
+        if finger == "thumb":  # it rests where the table has its abduction
             rest = math.radians(finger_degrees({})["thumb_cmc_abduction"])
             names, origin = ("mc", *names), _metacarpal(size, side) * place(rotation=pin.utils.rotate("y", rest))
-        elif finger == "thumb":
-            origin = _metacarpal(size, side) * place(z=-keyed_hand("thumb_mc", "length") * size.hand_length)
         for name in names:
             key, segment = f"{finger}_{name}", f"{side}_{finger}_{PARTS[name]}"
             yield FingerPart(finger, key, segment, parent, origin)

@@ -63,7 +63,7 @@ def _with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
     joints, marks = list(spec.joints), {mark.name: mark for mark in spec.landmarks}
     solids = [solid for solid in spec.solids if solid.segment not in hands]
     for side in SIDES:
-        parts = tuple(finger_parts(size, side, thumb_root=True))
+        parts = tuple(finger_parts(size, side))
         added = finger_joints(side, parts)
         joints += added
         links += hand_links(size, side, parts, added)
