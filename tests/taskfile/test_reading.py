@@ -199,6 +199,8 @@ def test_a_hand_of_several_people_names_its_owner(tmp_path: Path, hand: str) -> 
     people = "".join(f'[[figure]]\nname = "human"\ncalled = "{name}"\n' for name in ("anna", "bob"))
     ball = '[[object]]\nname = "ball"\nshape = "sphere"\nradius = 0.05\nat = [0.4, 0.2, 1.0]\n'
     path = tmp_path / "two.toml"
-    path.write_text(f'{people}{ball}[[goal]]\ntype = "grasp"\nhand = "{hand}"\nthing = "ball"\n')
-    with pytest.raises(WholebodyError, match=rf"key hand: '{hand}' is no hand of .*give 'anna/left' or 'anna/right'"):
+    gripper = '[[figure]]\nname = "hand"\ncalled = "gripper"\non = "bob/head_top"\n'
+    path.write_text(f'{people}{gripper}{ball}[[goal]]\ntype = "grasp"\nhand = "{hand}"\nthing = "ball"\n')
+    hands = "'anna/left' or 'anna/right' or 'bob/left' or 'bob/right' or 'bob/gripper/right'"
+    with pytest.raises(WholebodyError, match=rf"key hand: '{hand}' is no hand of .*give {hands}"):
         read_task(path)

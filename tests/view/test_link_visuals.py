@@ -79,6 +79,7 @@ def test_figures_side_by_side_are_drawn_each_as_it_is_alone(robot: wb.Figure) ->
     at = (0.5, -0.3, 0.2, 0.0, 0.0, 1.0, 0.0)
     scene = wb.Scene({"anna": wb.load("human"), "robot": (robot, at)})
     assert LinkVisuals(scene.figure, ("anna/",)).links == {"robot/a", "robot/b"}
+    assert "anna/left_thigh" in LinkVisuals(scene.figure).links  # its flesh was said to be a mesh without a file
     bodies, graph = Bodies(scene, (), False), SceneGraph()
     bodies.build(graph)
     shown = {path for path, node in graph.store.nodes.items() if node.object and path.startswith("/figure")}

@@ -20,6 +20,7 @@ from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.fields import Range
 from wholebody.figures.figure import Figure
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
+from wholebody.geometry.flesh import is_flesh
 from wholebody.geometry.hull import cylinder_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces, cached, cached_entry
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh, read_parts
@@ -166,7 +167,7 @@ def drawn_of(figure: Figure) -> list[Drawn]:
         red, green, blue, alpha = visual.meshColor.tolist()
         given: Color = (red, green, blue, alpha)
         place = np.array(visual.placement.homogeneous)
-        if not visual.meshPath:
+        if not visual.meshPath or is_flesh(visual):
             solid = visual.geometry
             drawn = triangles_of(solid) if isinstance(solid, coal.BVHModelBase) else solid
             made.append(Drawn(link, joint, place, drawn, given))

@@ -264,7 +264,8 @@ def _check_hand(entry: Entry, scene: Scene) -> None:
         return
     owner, slash, own = hand.partition("/")
     if not slash or owner not in members or own.rpartition("/")[2].split("_")[0] not in ("left", "right"):
-        named = " or ".join(f"'{name}/{side}'" for name in members[:2] for side in ("left", "right"))
+        hands = [frame.removesuffix("_palm") for frame in scene.figure.frames if frame.endswith("_palm")]
+        named = " or ".join(map(shown, hands[:6])) or "a figure with hands"
         raise entry.where.at("hand").fault(f"{shown(hand)} is no hand of one of the figures; give {named}")
 
 
