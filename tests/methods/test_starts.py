@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.starts import Minima, alike, crouched, restarts, seated, throughout
+from wholebody.methods.starts import Minima, alike, crouched, hooked_hands, restarts, seated, throughout
 
 
 def descents_needed(values, fewest: int = 0) -> int:
@@ -173,6 +173,24 @@ def test_who_sits_is_over_the_seat_in_eight_directions_and_what_is_frozen_stays(
     assert yaws == set(range(0, 360, 45))
     for q in frozen:
         assert figure.placement(q, "anna/pelvis").isApprox(figure.placement(problem.start, "anna/pelvis"), 1e-9)
+
+
+def hooked(scene: wb.Scene, hand: str) -> list[np.ndarray]:
+    scene.add(wb.Capsule(0.02, 0.3), name="bar", at=(0.4, 0.0, 1.1))
+    problem = wb.Problem(scene, goals=[wb.Grasp(hand, "bar", "power")])
+    with scene.figure.posed(problem.start) as state:
+        return list(hooked_hands(problem, state, problem.start))
+
+
+def test_hands_of_one_of_several_people_hook_as_those_of_one_alone() -> None:
+    """Such starts were refused: 'anna/right' is no side."""
+    person = wb.load("human", hands="fingers")
+    alone = hooked(wb.Scene(person), "right")
+    pair = wb.Scene({"anna": person, "thumbelina": (person, (2.0, 0.0, 0.0))})
+    both = hooked(pair, "anna/right")
+    assert len(alone) == len(both) == 3
+    for one, two in zip(alone, both, strict=True):
+        np.testing.assert_allclose(pair.figure.part("anna", two), one, atol=1e-12)
 
 
 def test_two_people_take_two_chairs() -> None:

@@ -108,6 +108,13 @@ def test_a_study_file_is_solved_by_command(folder: Path, capsys: pytest.CaptureF
     assert ",short,far,nearer,unreachable," in rows[2]
 
 
+@pytest.mark.parametrize("moves", ["", "move = {}\n"])
+def test_a_layout_may_be_the_tasks_own(folder: Path, moves: str) -> None:
+    (folder / "study.toml").write_text(f'task = "task.toml"\n[[layout]]\nname = "as it is"\n{moves}')
+    assert main(["study", str(folder / "study.toml"), "--out", str(folder / "out")]) == 0
+    assert ",as it is,solved," in (folder / "out" / "cases.csv").read_text()
+
+
 def test_a_person_takes_the_place_of_the_percentile_of_a_file(folder: Path) -> None:
     small = TASK.replace('name = "human"', 'name = "human"\nsex = "female"\npercentile = 5')
     (folder / "task.toml").write_text(small)

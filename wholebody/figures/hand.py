@@ -284,13 +284,14 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
     }
 
 
-def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
-    """Angles [rad] of fingers from which hands take a bar: no thumb, a fist's, a hook's; nothing without sides."""
+def opened_for_a_bar(hands: Sequence[str]) -> Iterator[dict[str, float]]:
+    """Angles [rad] of the fingers of "right" or "anna/right" to take a bar: no thumb, a fist's, a hook's."""
     # Fingers that first bend at their roots touch the bar with their first phalanges before the palm does.
-    hook, fist = ({name: angle for side in sides for name, angle in finger_angles(shape, side).items()}
-                  for shape in ("hook", "fist"))  # fmt: skip
-    fingers = {name: angle for name, angle in hook.items() if "thumb" not in name}
+    own = [hand.rpartition("/") for hand in hands]
+    hook, fist = ({figure + slash + name: angle for figure, slash, side in own
+                   for name, angle in finger_angles(shape, side).items()} for shape in ("hook", "fist"))  # fmt: skip
+    fingers = {name: angle for name, angle in hook.items() if "_thumb_" not in name}
     if fingers:
         yield fingers
-        yield fingers | {name: angle for name, angle in fist.items() if "thumb" in name}
+        yield fingers | {name: angle for name, angle in fist.items() if "_thumb_" in name}
         yield hook

@@ -127,8 +127,8 @@ def least_effort(problem: Problem) -> list[Array]:
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without."""
     figure, terms = problem.scene.figure, (*problem.goals, *problem.constraints)
-    sides = sorted({term.hand.split("_")[0] for term in terms if isinstance(term, Grasp) and term.kind == "power"})
-    for angles in opened_for_a_bar(sides):
+    grips = [term for term in terms if isinstance(term, Grasp) and term.kind == "power"]
+    for angles in opened_for_a_bar(sorted({term.frame.removesuffix("_palm") for term in grips})):
         if angles.keys() <= set(figure.joints):
             move = pin.difference(figure.model, start, figure.with_joints(start, angles))
             yield _moved(problem, state, start, move)

@@ -116,7 +116,7 @@ _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
 _TABLES = {
     "person": Table((_NAME, Key("called", TEXT), *FIGURES["human"].keys), True),
     "target": Table((_NAME, Key("at", POSITION, True)), True),
-    "layout": Table((_NAME, Key("move", _PLACES, True)), True),
+    "layout": Table((_NAME, Key("move", _PLACES)), True),
 }
 
 
@@ -144,5 +144,5 @@ def _by_name(contents: Contents, table: str) -> dict[str, Any] | None:
             message = f"{shown(name)} is the name of another {table} too; give it another one"
             raise entry.where.at("name").fault(message)
         rest = {key: value for key, value in entry.values.items() if key != "name"}
-        found[name] = rest if table == "person" else next(iter(rest.values()))
+        found[name] = rest if table == "person" else next(iter(rest.values()), {})  # a layout may move nothing
     return found or None

@@ -255,7 +255,7 @@ class ByName:
 
     def read(self, value: Any, where: Where) -> dict[str, Any]:
         """Return the values by name."""
-        if not isinstance(value, dict) or not value:
+        if not isinstance(value, dict):
             raise where.fault(f"{shown(value)} is not a table of {self.what}; write {{ {self.example} }}")
         return {name: self.kind.read(entry, where.at(name)) for name, entry in value.items()}
 
