@@ -147,6 +147,8 @@ def statics_of(scene: Scene, term: _HeldPerson) -> Statics:
     if person:
         checks.known(person, tuple(joined.members), "figure", f"{where}: person")
         prefix = f"{person}/"
+    elif joined.members:
+        raise InputError(f"{where}: the scene has several figures; name one, person={next(iter(joined.members))!r}")
     figure = check_person(joined.members[person].figure if person else joined, f"{where}: the scene's figure")
     if "spine1_flexion" not in figure.joints:
         raise InputError(f"{where}: takes a person with a spine; load one with wb.load('human')")
