@@ -17,7 +17,7 @@ from wholebody.base.files import checked_target, templates, write
 from wholebody.problem import Problem
 
 INCHES = 2.4  # width of one height
-MEANING = "above 0: reached, 1 with the least measure\nbelow 0: metres short; gray: inside a thing"
+MEANING = "above 0: reached, 1 with the least measure\nbelow 0: metres short; gray: inside, or against other goals"
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
 VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")  # Words of the codes of a verdict
@@ -33,7 +33,7 @@ class ReachMap(Shown):
         x, y, z: (nx,), (ny,), (nz,) the places along each axis, metres.
         verdict: (nx, ny, nz) codes, whose words `VERDICTS` has: reached with a posture; missed by searches; excluded,
             because another place is missed by more than its distance; beyond the lengths of the limbs; inside of a
-            thing; not tried.
+            thing, or in contradiction to the other goals; not tried.
         left: (nx, ny, nz) distance to the nearest posture that was found, metres: 0 where reached, a lower bound where
             not searched.
         measure: (nx, ny, nz) weighted sum of the measures where reached, 0 elsewhere.
@@ -64,7 +64,7 @@ class ReachMap(Shown):
 
     @property
     def inside(self) -> Mask:
-        """(nx, ny, nz) which places lie inside of a thing."""
+        """(nx, ny, nz) which places lie inside of a thing, or contradict the other goals."""
         return np.asarray(self.verdict == INSIDE)
 
     @property
