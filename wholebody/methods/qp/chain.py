@@ -57,12 +57,12 @@ def chains_of(problem: Problem) -> Pool[Chains]:
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
-    """Entries of the goals, where they are places and rotations and nothing else must hold; None otherwise."""
-    if problem.constraints or problem.bounds or not problem.goals:
+    """Entries of goals and holds, where they are places and rotations and nothing else must hold; None otherwise."""
+    if problem.bounds or not problem.goals or not all(type(one) is tasks.Hold for one in problem.constraints):
         return None
     found: list[Entry] = []
-    for goal in problem.goals:
-        entries = entries_of(goal, problem.scene.model)
+    for term in (*problem.goals, *problem.constraints):
+        entries = entries_of(term, problem.scene.model)
         if entries is None or any(entry.table != RESIDUAL for entry in entries):
             return None
         found += entries
