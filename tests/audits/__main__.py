@@ -16,7 +16,7 @@ from typing import Any
 from wholebody.base.checks import number
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import only, report
+from wholebody.bench.rows import in_words, only, report
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import CLIPS, listed, measuring, publish, seed
 from wholebody.cli.bench.measurements import chosen, clips
@@ -261,9 +261,7 @@ def plans(arguments: argparse.Namespace) -> None:
     facts, found = machine(), []
     for row in rows(names, cases, seeds):
         found.append(row)
-        print(
-            f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True
-        )
+        print(in_words(row), flush=True)
     text = report("Motions from starts to goals; lengths by the shortest of each question.", {"": found}, facts)
     publish("plans", text, arguments, facts=facts, tables={"plans": found}, page=None)
 
@@ -292,7 +290,31 @@ def postures(arguments: argparse.Namespace) -> None:
     publish("postures", text, arguments, facts=facts, tables={"postures": rows}, page=None)
 
 
-COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans)
+@measuring(
+    "clips",
+    "recordings retargeted, beside mink frame by frame with GMR's weights",
+    "Follow every recording (BVH) below a folder by wholebody and by mink, and judge both alike.",
+    option("folder", type=Path, metavar="FOLDER", help="folder of recordings"),
+    count("--frames", 60, "frames of each recording that are followed"),
+    listed("--figure", "figures that follow; those of files go about freely (default: the person)", "FIGURE"),
+)
+def clips_compared(arguments: argparse.Namespace) -> None:
+    """Follow by both tools; --quick follows 20 frames."""
+    from tests.audits.clips import ABOUT, compare, totals
+    from wholebody.figures import load
+
+    names = arguments.figure or ["human"]
+    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
+    rows = []
+    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
+        rows.append(row)
+        print(in_words(row), flush=True)
+    facts = machine() | {"frames": str(arguments.frames)}
+    text = report(ABOUT, {"All clips": totals(rows), "Each": rows}, facts)
+    publish("clips", text, arguments, facts=facts, tables={"clips": rows}, page=None)
+
+
+COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans, clips_compared)
 
 
 def main(words: Sequence[str] | None = None) -> int:

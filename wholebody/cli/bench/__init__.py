@@ -137,8 +137,6 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
             "time.",
             path("folder", "FOLDER", "of the files"),
             count("--frames", 60, "frames of each recording that are retargeted"),
-            flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
-            listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
         )(later("bench.measurements.measure_files")),
         command(
             "attack",

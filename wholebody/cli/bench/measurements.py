@@ -12,7 +12,7 @@ from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.base.files import make_folder
 from wholebody.bench.measure import motion, scaling, step
-from wholebody.bench.measure.files import ABOUT, compare, read, totals
+from wholebody.bench.measure.files import read
 from wholebody.bench.measure.motion import EQUIPMENT, SYNTHETIC, recorded, recordings, synthetic
 from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
 from wholebody.bench.measure.world import ENGINES, all_throws, drops, installed, measure, throw_summary
@@ -149,10 +149,6 @@ def measure_files(arguments: argparse.Namespace) -> int:
     """Read; 1 where a file ends in anything but an answer or a sentence."""
     if not arguments.folder.is_dir():
         raise InputError(f"{arguments.folder}: is no folder; give one with files")
-    if arguments.compare:
-        return _compared(arguments)
-    if arguments.figure is not None:
-        raise InputError("--figure is for --compare; recordings are read for the person")
     rows = []
     for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
         rows.append(row)
@@ -163,18 +159,3 @@ def measure_files(arguments: argparse.Namespace) -> int:
     about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
     publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
     return int(any(row["read"] == "FAULT" for row in rows))
-
-
-def _compared(arguments: argparse.Namespace) -> int:
-    """Follow recordings by both tools; figures of files may go about freely."""
-    names = arguments.figure or ["human"]
-    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
-    rows = []
-    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
-        rows.append(row)
-        print(in_words(row), flush=True)
-    facts = machine() | {"frames": str(arguments.frames)}
-    tables = {"All clips": totals(rows), "Each": rows}
-    text = report(ABOUT, tables, facts)
-    publish("clips", text, arguments, facts=facts, tables={"clips": rows}, page=None)
-    return 0
