@@ -14,6 +14,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.base.compiled import usable_cores
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import csv_text, make_folder, templates, write
 from wholebody.bench.statistics import Interval
@@ -25,12 +26,11 @@ if TYPE_CHECKING:
 
 def machine() -> dict[str, str]:
     """Return what a reader has to know of the machine and of the versions, in the order in which it is written."""
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     facts = {
         "wholebody": __version__,
         "date": date.today().isoformat(),
         "processor": _processor(),
-        "cores": str(usable),
+        "cores": str(usable_cores()),
         "load": f"{os.getloadavg()[0]:.1f} in the minute before",
         "system": f"{platform.system()} {platform.release()}, {platform.libc_ver()[1] or 'unknown libc'}",
         "python": platform.python_version(),
