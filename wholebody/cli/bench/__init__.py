@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wholebody.cli.arguments import JOBS
-from wholebody.cli.bench.command import CLIPS, folders, listed, measuring, quick, seed
+from wholebody.cli.bench.command import CLIPS, listed, measuring, out, quick, seed
 from wholebody.cli.command import Group, command, count, flag, later, path, real, text, whole
 
 group = Group(
@@ -37,7 +37,7 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
             *JOBS,
             flag("--held-out", "pose problems of distributions that no constant was tuned on"),
             path("--again", "LOCK.json", "repeat the comparison that left this file"),
-            *folders("out/compare"),
+            out("out/compare"),
         )(later("bench.comparing.compare")),
         command(
             "export",
@@ -153,7 +153,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
             count("--cases", None, "end after as many cases, if the time suffices"),
             listed("--kinds", "of cases, such as solve, stream, own-term, sleeper, file (default: all)", "KIND"),
             count("--jobs", 1, "processes at a time"),
-            *folders("out/attack"),
+            out("out/attack"),
         )(later("bench.hard_cases.attack")),
     ),
     title="what to measure",

@@ -13,7 +13,7 @@ from wholebody.bench.suite.adapters.registry import adapters, missing
 from wholebody.bench.suite.compare import own_task
 from wholebody.bench.suite.compare import run as comparison
 from wholebody.bench.suite.compare.lock import differences, in_words, locked, read_lock, shares
-from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
+from wholebody.bench.suite.compare.report import PAGE, publish
 from wholebody.bench.suite.compare.run import QUICK, Settings
 from wholebody.bench.suite.compare.summary import advice
 from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
@@ -40,8 +40,6 @@ def compare(arguments: argparse.Namespace) -> int:
             settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(),
             lambda what: tell(1.0, f"making {what}"),
         )  # fmt: skip
-    if arguments.update_docs is not None:
-        to_docs(given, arguments.out, arguments.update_docs, "held-out" if arguments.held_out else "compare")
     for sentence in advice(given.results, given.rows):
         print("- " + sentence.replace("**", "").replace("`", ""))
     print(f"wrote {arguments.out / PAGE}")
@@ -71,10 +69,10 @@ def _alone(arguments: argparse.Namespace, flag: str, others: tuple[str, ...]) ->
             raise InputError(f"--{name.replace('_', '-')} does not go with --{flag.replace('_', '-')}; leave one out")
 
 
-OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster", "held_out", "update_docs")
+OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster", "held_out")
 """Options that a repeated comparison reads from its lock file, or does not have."""
 
-OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs", "again", "held_out")
+OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "again", "held_out")
 """Options that say how much of the sets is compared, or where; a task has one problem and takes none of them."""
 
 

@@ -57,7 +57,7 @@ def measure_step(arguments: argparse.Namespace) -> None:
     text = step.step_report(spent, judged, facts, bool(figures), notes)
     rows = {f"{name}-time": spent, f"{name}-result": judged}
     charts = _charts(name, step.panels(runs), "Share of steps within a time, and least distance of any pair")
-    publish(name, text, arguments, facts=facts, tables=rows, charts=charts, page=None if figures else "results.md")
+    publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
 
 
 def measure_scaling(arguments: argparse.Namespace) -> None:
@@ -157,5 +157,5 @@ def measure_files(arguments: argparse.Namespace) -> int:
     known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
     about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
     about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
-    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
+    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows})
     return int(any(row["read"] == "FAULT" for row in rows))
