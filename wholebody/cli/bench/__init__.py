@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from wholebody.cli.arguments import JOBS
 from wholebody.cli.bench.command import CLIPS, listed, measuring, out, quick, seed
-from wholebody.cli.command import Group, command, count, flag, later, path, real, text, whole
+from wholebody.cli.command import Group, command, count, later, path, real, text, whole
 
 group = Group(
     "bench",
@@ -20,7 +20,6 @@ on the machine and on what else runs on it: compare ratios of one run.""",
 Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
 (report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. Call an
 interrupted run again with the same settings and folder to continue it; a finished one writes its report again.
---held-out adds uniform witnesses, other people, other clutter and other robots beside the sets of the same questions.
 --again compares times in units of a reference kernel; the exit code is 1 if the solved problems differ. --jobs solves
 cases in parallel by joblib, --cluster on a dask cluster.""",
             quick("20 problems a set, within three minutes on two cores"),
@@ -35,7 +34,6 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
             real("--minutes", "N", "of solving in all (default: 25; with --quick 2)"),
             seed("of all problems"),
             *JOBS,
-            flag("--held-out", "pose problems of distributions that no constant was tuned on"),
             path("--again", "LOCK.json", "repeat the comparison that left this file"),
             out("out/compare"),
         )(later("bench.comparing.compare")),

@@ -16,7 +16,7 @@ from wholebody.bench.suite.compare.lock import differences, in_words, locked, re
 from wholebody.bench.suite.compare.report import PAGE, publish
 from wholebody.bench.suite.compare.run import QUICK, Settings
 from wholebody.bench.suite.compare.summary import advice
-from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
+from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.tables import bar, print_rows
 from wholebody.taskfile import read_task
@@ -51,10 +51,7 @@ def _facts(beside: str) -> dict[str, str]:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    if arguments.held_out:
-        _alone(arguments, "held_out", ("sets",))
-    named = arguments.sets or (beside(print) if arguments.held_out else SETS)
-    sets = tuple(problem_set(name) for name in dict.fromkeys(named))
+    sets = tuple(problem_set(name) for name in dict.fromkeys(arguments.sets or SETS))
     chosen = None if arguments.methods is None else tuple(dict.fromkeys(arguments.methods))
     amounts: dict[str, Any] = dict(QUICK) if arguments.quick else {"cases": CASES}
     asked = {"cases": arguments.cases, "minutes": arguments.minutes}
@@ -69,10 +66,10 @@ def _alone(arguments: argparse.Namespace, flag: str, others: tuple[str, ...]) ->
             raise InputError(f"--{name.replace('_', '-')} does not go with --{flag.replace('_', '-')}; leave one out")
 
 
-OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster", "held_out")
+OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster")
 """Options that a repeated comparison reads from its lock file, or does not have."""
 
-OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "again", "held_out")
+OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "again")
 """Options that say how much of the sets is compared, or where; a task has one problem and takes none of them."""
 
 
