@@ -315,6 +315,25 @@ def clips_compared(arguments: argparse.Namespace) -> None:
     publish("clips", text, arguments, facts=facts, tables={"clips": rows})
 
 
+@measuring(
+    "throws",
+    "things thrown at a person, and whether any passes through without a word",
+    "Throw things at a person who stands, walks or is dragged, for about ten minutes. The exit code is 1 "
+    "where a thing passes through and nothing tells it.",
+)
+def throws(arguments: argparse.Namespace) -> int:
+    """Throw; --quick throws each thing once, at one speed."""
+    from tests.audits.throws import ABOUT, all_throws, throw_summary
+
+    facts, rows = machine(), []
+    for row in all_throws(1 if arguments.quick else 3, arguments.quick):
+        rows.append(row)
+        print(in_words(row), flush=True)
+        write_rows(arguments.out / "throws.csv", facts, rows)
+    publish("throws", report(ABOUT, {"": throw_summary(rows)}, facts), arguments)
+    return int(any(row["silent"] for row in rows))
+
+
 @command(
     "docs",
     "put reports into the documentation",
@@ -332,7 +351,7 @@ def docs(arguments: argparse.Namespace) -> None:
         print(f"wrote {put(file, arguments.docs, arguments.name)}")
 
 
-COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans, clips_compared, docs)
+COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans, clips_compared, throws, docs)
 
 
 def main(words: Sequence[str] | None = None) -> int:

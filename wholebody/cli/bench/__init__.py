@@ -120,10 +120,8 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
         )(later("bench.measurements.measure_motion")),
         measuring(
             "world",
-            "things that move by themselves: throws at a person, drops beside MuJoCo and Rapier",
-            "Throw things at a person who stands, walks or is dragged; drop, slide and stack the same things in "
-            "wholebody, MuJoCo and Rapier. The whole takes about ten minutes of one processor.",
-            listed("--parts", "throws, drops (default: all)", "PART"),
+            "things that move by themselves, beside MuJoCo and Rapier",
+            "Drop, slide and stack the same things in wholebody, MuJoCo and Rapier.",
             listed("--only", "names of drops (default: all)", "DROP"),
             listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
         )(later("bench.measurements.measure_world")),
