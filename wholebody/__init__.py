@@ -15,8 +15,6 @@ What fewer programs need stands in `wb.dynamics`, `wb.ergonomics`, `wb.figures`,
 
 from __future__ import annotations
 
-from wholebody.base.imports import end_quietly, exported
-
-end_quietly()  # before anything that takes time
+from wholebody.base.imports import exported
 
 __getattr__, __dir__, __all__ = exported(__name__, __file__)

@@ -16,7 +16,7 @@ from typing import Any
 from wholebody.base.checks import number
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import only, report
+from wholebody.bench.rows import in_words, only, report
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import CLIPS, listed, measuring, publish, seed
 from wholebody.cli.bench.measurements import chosen, clips
@@ -45,7 +45,7 @@ def newton(arguments: argparse.Namespace) -> None:
     linear = list(newton.linear_rows(sizes, repeats))
     found: dict[str, Any] = {"linear": linear, "solves": solves, "agreements": agreements, "drags": drags}
     tables = {f"newton-{name}": rows for name, rows in found.items()}
-    publish("newton", newton.report(**found, facts=facts), arguments, facts=facts, tables=tables, page=None)
+    publish("newton", newton.report(**found, facts=facts), arguments, facts=facts, tables=tables)
 
 
 @measuring(
@@ -89,6 +89,7 @@ def qp(arguments: argparse.Namespace) -> None:
     "Measure the dimensions and ranges of motion of the person beside those of people, "
     "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
     "docs/human.md, with a picture of each contact and task.",
+    option("--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS", help="write the page there too"),
 )
 def human(arguments: argparse.Namespace) -> None:
     """Measure; --quick measures one design case and three tasks, and draws nothing."""
@@ -176,7 +177,7 @@ def loads(arguments: argparse.Namespace) -> None:
         rows.append(row)
         write_rows(arguments.out / "loads.csv", facts, rows)
         print(f"{row.case}, {row.tool}", flush=True)
-    publish("loads", loads.report(rows, facts), arguments, page=None)
+    publish("loads", loads.report(rows, facts), arguments)
 
 
 @measuring(
@@ -201,7 +202,7 @@ def detail(arguments: argparse.Namespace) -> None:
     )
     shown = [row for row in detail.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
     text = report(about, {"": only(shown, *detail.SHOWN)}, facts, list(refused))
-    publish("detail", text, arguments, facts=facts, tables={"detail": rows}, page=None)
+    publish("detail", text, arguments, facts=facts, tables={"detail": rows})
 
 
 @measuring(
@@ -220,7 +221,7 @@ def ablation(arguments: argparse.Namespace) -> None:
     whole, rows = ablation.ablation(method, given, ablation.mechanisms(method), print)
     text = ablation.report(method, len(given), whole, rows, ablation.constants(method)[1], facts)
     name = f"ablation-{method}"
-    publish(name, text, arguments, facts=facts, tables={name: rows}, page=None)
+    publish(name, text, arguments, facts=facts, tables={name: rows})
 
 
 @measuring(
@@ -240,7 +241,7 @@ def robots(arguments: argparse.Namespace) -> None:
         told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
         print(f"{row.case}: {told}", flush=True)
     text = robots_report(found, facts, reaches)
-    publish("robots", text, arguments, facts=facts, tables={"robots": found}, page=None)
+    publish("robots", text, arguments, facts=facts, tables={"robots": found})
 
 
 @measuring(
@@ -261,11 +262,9 @@ def plans(arguments: argparse.Namespace) -> None:
     facts, found = machine(), []
     for row in rows(names, cases, seeds):
         found.append(row)
-        print(
-            f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}", flush=True
-        )
+        print(in_words(row), flush=True)
     text = report("Motions from starts to goals; lengths by the shortest of each question.", {"": found}, facts)
-    publish("plans", text, arguments, facts=facts, tables={"plans": found}, page=None)
+    publish("plans", text, arguments, facts=facts, tables={"plans": found})
 
 
 @measuring(
@@ -289,10 +288,70 @@ def postures(arguments: argparse.Namespace) -> None:
         rows, notes = list(human_postures.measure(man, "fit" if arguments.quick else None)), []
     told = f"Standard deviations of people: {human_postures.summary(rows)}."
     text = "\n\n".join(["# Postures of people and ours", told, *notes])
-    publish("postures", text, arguments, facts=facts, tables={"postures": rows}, page=None)
+    publish("postures", text, arguments, facts=facts, tables={"postures": rows})
 
 
-COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans)
+@measuring(
+    "clips",
+    "recordings retargeted, beside mink frame by frame with GMR's weights",
+    "Follow every recording (BVH) below a folder by wholebody and by mink, and judge both alike.",
+    option("folder", type=Path, metavar="FOLDER", help="folder of recordings"),
+    count("--frames", 60, "frames of each recording that are followed"),
+    listed("--figure", "figures that follow; those of files go about freely (default: the person)", "FIGURE"),
+)
+def clips_compared(arguments: argparse.Namespace) -> None:
+    """Follow by both tools; --quick follows 20 frames."""
+    from tests.audits.clips import ABOUT, compare, totals
+    from wholebody.figures import load
+
+    names = arguments.figure or ["human"]
+    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
+    rows = []
+    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
+        rows.append(row)
+        print(in_words(row), flush=True)
+    facts = machine() | {"frames": str(arguments.frames)}
+    text = report(ABOUT, {"All clips": totals(rows), "Each": rows}, facts)
+    publish("clips", text, arguments, facts=facts, tables={"clips": rows})
+
+
+@measuring(
+    "throws",
+    "things thrown at a person, and whether any passes through without a word",
+    "Throw things at a person who stands, walks or is dragged, for about ten minutes. The exit code is 1 "
+    "where a thing passes through and nothing tells it.",
+)
+def throws(arguments: argparse.Namespace) -> int:
+    """Throw; --quick throws each thing once, at one speed."""
+    from tests.audits.throws import ABOUT, all_throws, throw_summary
+
+    facts, rows = machine(), []
+    for row in all_throws(1 if arguments.quick else 3, arguments.quick):
+        rows.append(row)
+        print(in_words(row), flush=True)
+        write_rows(arguments.out / "throws.csv", facts, rows)
+    publish("throws", report(ABOUT, {"": throw_summary(rows)}, facts), arguments)
+    return int(any(row["silent"] for row in rows))
+
+
+@command(
+    "docs",
+    "put reports into the documentation",
+    "Put reports of benches and audits, with their charts, into the documentation: as texts, and into the section of a "
+    "page between the markers of their name.",
+    option("reports", type=Path, nargs="+", metavar="NAME.md", help="reports, such as out/bench/step.md"),
+    option("--docs", type=Path, default=Path("docs"), metavar="DIR", help="the documentation (default: docs)"),
+    option("--name", default="", help="of the only report, in place of its file's, such as held-out"),
+)
+def docs(arguments: argparse.Namespace) -> None:
+    """Put them there."""
+    from tests.audits.documenting import put
+
+    for file in arguments.reports:
+        print(f"wrote {put(file, arguments.docs, arguments.name)}")
+
+
+COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans, clips_compared, throws, docs)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -14,20 +14,12 @@ from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import adapters, stepping
 
 
-@pytest.fixture
-def docs(tmp_path: Path) -> Path:
-    folder = tmp_path / "docs"
-    folder.mkdir()
-    (folder / "results.md").write_text("<!-- bench:step -->\n<!-- /bench:step -->")
-    return folder
-
-
-def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_step(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     reaches = VARIANTS[1:2]
     monkeypatch.setattr("wholebody.cli.bench.measurements.VARIANTS", reaches)
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "1", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
-    assert bench("step", *words, "--update-docs", str(docs)) == 0
+    assert bench("step", *words) == 0
     rows = csv_rows(tmp_path / "out" / "step-time.csv")
     each = [(reach, tool) for reach in reaches for tool in ("wholebody/daqp", "placo", "Pinocchio and coal")]
     assert [(row["case"], row["tool"]) for row in rows] == each
@@ -39,12 +31,11 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
     for row in csv_rows(tmp_path / "out" / "step-result.csv"):
         assert int(row["pairs"]) >= 700
         assert float(row["beyond limits rad"]) < 1e-9
-    page = (docs / "results.md").read_text()
-    assert "contact, median × placo" in page
-    assert "[Everything measured](assets/bench/step.txt)" in page
-    assert "| contact | placo |" in (docs / "assets/bench/step.txt").read_text()
-    assert "assets/bench/step.svg" in page
-    assert (docs / "assets" / "bench" / "step.svg").read_text().startswith("<?xml")
+    report = (tmp_path / "out" / "step.md").read_text()
+    assert "contact, median × placo" in report
+    assert "| contact | placo |" in report
+    assert report.endswith("least distance of any pair](step.svg)\n")
+    assert (tmp_path / "out" / "step.svg").read_text().startswith("<?xml")
     assert (tmp_path / "out" / "step.png").read_bytes().startswith(b"\x89PNG")
     assert "pairs that can touch" in capsys.readouterr().out
 

@@ -7,7 +7,7 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from wholebody.bench.measure.world import throw_summary
+from tests.audits.throws import throw_summary
 from wholebody.bench.rows import Row, across, only, shares, shown, table
 from wholebody.bench.statistics import NOTHING, Interval
 

@@ -11,13 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.csv_rows import csv_rows
-from wholebody.base.errors import FileFormatError
 from wholebody.bench.rows import Row
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import machine, render, replace_section, sentence, write_rows
-
-PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
-
+from wholebody.bench.tables import machine, render, sentence, write_rows
 
 text = st.text(st.characters(blacklist_categories=("Cs",), blacklist_characters="\0"))
 figures = st.fixed_dictionaries({"count": st.integers(), "value": st.floats(allow_nan=False)})
@@ -37,21 +33,6 @@ def test_rows_come_back_exactly(tmp_path_factory: pytest.TempPathFactory, rows: 
 def test_line_breaks_in_a_cell_come_back(tmp_path: Path, said: str) -> None:
     write_rows(tmp_path / "rows.csv", {"processor": "a"}, [Row(said, "", {"count": 1}), Row("last", "", {"count": 2})])
     assert [row["case"] for row in csv_rows(tmp_path / "rows.csv")] == [said, "last"]
-
-
-def test_a_section_is_replaced_and_the_rest_of_the_page_stays(tmp_path: Path) -> None:
-    page = tmp_path / "results.md"
-    page.write_text(PAGE)
-    replace_section(page, "step", "new\n")
-    once = page.read_text()
-    assert once == PAGE.replace("\nold\n", "\n\nnew\n\n")
-    replace_section(page, "step", "new\n")
-    assert page.read_text() == once, "twice is as good as once"
-    with pytest.raises(FileFormatError, match="bench:solve"):
-        replace_section(page, "solve", "new")
-    assert page.read_text() == once
-    with pytest.raises(FileFormatError, match="no such page"):
-        replace_section(tmp_path / "none.md", "step", "new")
 
 
 def test_the_machine_is_described() -> None:

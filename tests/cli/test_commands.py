@@ -331,15 +331,7 @@ def test_what_takes_long_is_told_on_stderr_once_and_the_cache_is_cleared(
     assert not list(tmp_path.iterdir())
 
 
-def test_completion_names_commands_and_options(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("shtab")
-    assert main(["completion", "bash"]) == 0
-    script = capsys.readouterr().out
-    assert "--live" in script
-    assert "doctor" in script
-
-
-@pytest.mark.parametrize(("package", "command"), [("shtab", ["completion", "bash"]), ("viser", ["drag", "--live"])])
+@pytest.mark.parametrize(("package", "command"), [("viser", ["drag", "--live"])])
 def test_a_package_that_is_missing_is_named(
     package: str,
     command: list[str],

@@ -160,11 +160,11 @@ def test_answers_are_kept_when_the_next_question_comes(free_bodies):
 def test_answers_in_passing_are_overwritten_and_take_no_memory(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1), wb.Box((0.1, 0.1, 0.1))))
     workspace, q = scene.workspace(), scene.figure.neutral
-    first, kept = workspace.near_views(q, 1.0), workspace.near(q, 1.0)
+    first, kept = workspace.proximity.query_views(workspace.state.update(q).data, 1.0), workspace.near(q, 1.0)
     for part, again in zip(first, kept, strict=True):
         assert np.array_equal(part, again)
     q[7:10] = 0.2, 0.1, 0.0
-    second = workspace.near_views(q, 1.0)
+    second = workspace.proximity.query_views(workspace.state.update(q).data, 1.0)
     for before, after, same in zip(first, second, kept, strict=True):
         assert np.shares_memory(before, after)
         assert not np.shares_memory(after, same)

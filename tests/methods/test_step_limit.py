@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.world import DT, SHAPES, Throw
+from tests.audits.throws import DT, SHAPES, Throw
 from wholebody.methods import installed_methods
 from wholebody.methods.solve import as_method, method_for_motions
 from wholebody.tracking.loop import FrameLoop

@@ -14,9 +14,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.audits.throws import DT, SHAPES, Throw, throws
 from wholebody import tracking
 from wholebody.base.batches import fingerprint
-from wholebody.bench.measure.world import DT, SHAPES, Throw, throws
 from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
 from wholebody.tracking.overlaps import make_room

@@ -23,10 +23,10 @@ def one_line(text: str, most: int = SHOWN) -> str:
     return plain if len(plain) <= most else f"{plain[: most - 3]}..."
 
 
-def either(options: Iterable[str]) -> str:
-    """Several options in words: "a", "a or b", "a, b or c"."""
+def either(options: Iterable[str], word: str = "or") -> str:
+    """Several options in words: "a", "a or b", "a, b or c"; with another word in place of "or"."""
     *others, last = options
-    return f"{', '.join(others)} or {last}" if others else last
+    return f"{', '.join(others)} {word} {last}" if others else last
 
 
 def suggestion(name: str, known: Collection[str]) -> str:

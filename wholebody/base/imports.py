@@ -1,8 +1,7 @@
-"""Names of a package that are loaded when they are first used (PEP 562), and Ctrl-C while the command is imported."""
+"""Names of a package that are loaded when they are first used (PEP 562)."""
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable
 from importlib import import_module
@@ -36,29 +35,3 @@ def _listed(folder: Path) -> dict[str, str]:
         module = line.split()[1] if line.startswith("from ") else module
         home.update({part.split(",")[0].strip(): module for part in line.split(" as ")[1:]})
     return home
-
-
-def end_quietly() -> None:
-    """Let Ctrl-C end the process of the command at once; the handler of another package is kept."""
-    # Libraries that are half imported make other errors of a KeyboardInterrupt, or print its traceback.
-    if _is_command(sys.orig_argv) and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-def raise_again() -> None:
-    """From here on Ctrl-C raises a KeyboardInterrupt, as Python has it, if `end_quietly` changed that."""
-    if _is_command(sys.orig_argv) and signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def _is_command(words: list[str]) -> bool:
-    """Whether a process was started by ``wholebody`` or ``python -m wholebody``, with these words."""
-    rest = iter(words[1:])
-    for word in rest:
-        if word == "-m":
-            return next(rest, "") == "wholebody"
-        if word in ("-X", "-W"):
-            next(rest, "")
-        elif not word.startswith("-"):
-            return word.replace("\\", "/").rpartition("/")[2] in ("wholebody", "wholebody.exe", "wholebody-script.py")
-    return False

@@ -14,7 +14,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.base.errors import FileFormatError
+from wholebody.base.compiled import usable_cores
 from wholebody.base.files import csv_text, make_folder, templates, write
 from wholebody.bench.statistics import Interval
 from wholebody.version import __version__
@@ -25,12 +25,11 @@ if TYPE_CHECKING:
 
 def machine() -> dict[str, str]:
     """Return what a reader has to know of the machine and of the versions, in the order in which it is written."""
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     facts = {
         "wholebody": __version__,
         "date": date.today().isoformat(),
         "processor": _processor(),
-        "cores": str(usable),
+        "cores": str(usable_cores()),
         "load": f"{os.getloadavg()[0]:.1f} in the minute before",
         "system": f"{platform.system()} {platform.release()}, {platform.libc_ver()[1] or 'unknown libc'}",
         "python": platform.python_version(),
@@ -113,33 +112,6 @@ def summed_programs(texts: Iterable[str]) -> str:
             by, _, count = part.rpartition(" ")
             total[by] += int(count)
     return programs_text(total)
-
-
-def publish_text(docs: Path, name: str, report: str, page: str | None, pictures: Sequence[str] = ()) -> Path:
-    """Write a report to ``assets/bench/NAME.txt`` of the documentation, its pictures and first table to a page."""
-    whole = docs / "assets" / "bench" / f"{name}.txt"
-    if page is not None:
-        table = re.search(r"^\|.*(?:\n\|.*)*", report, re.MULTILINE)
-        measured = re.search(r"^Measured (?:with|on) .*", report, re.MULTILINE)
-        parts = [*pictures, *(found[0] for found in (table, measured) if found)]
-        replace_section(docs / page, name, "\n\n".join(parts) + f" [Everything measured](assets/bench/{whole.name}).")
-    write_text(whole, report + "\n")
-    return whole if page is None else docs / page
-
-
-def replace_section(path: Path, name: str, text: str) -> None:
-    """Put text between the markers ``<!-- bench:NAME -->`` and ``<!-- /bench:NAME -->`` of a page."""
-    first, last = f"<!-- bench:{name} -->", f"<!-- /bench:{name} -->"
-    if not path.is_file():
-        raise FileFormatError(f"{path}: there is no such page; give the folder that holds results.md")
-    page = path.read_text(encoding="utf-8")
-    head, opened, rest = page.partition(first)
-    _, closed, tail = rest.partition(last)
-    if not opened or not closed:
-        raise FileFormatError(
-            f"{path}: the markers {first} and {last} are not in it; put them where the result belongs"
-        )
-    write_text(path, f"{head}{first}\n\n{text.strip()}\n\n{last}{tail}")
 
 
 TEMPLATES = Path(__file__).parent / "templates"

@@ -290,16 +290,4 @@ wrong search paths with their repairs. Print the folder and size of the cache of
 something is wrong; an absent optional package is no fault.""",
         flag("--clear-cache", "empty the cache of mesh pieces, and end"),
     )(later("doctor.doctor")),
-    command(
-        "completion",
-        "print the completion script of a shell",
-        """\
-Print a script with which a shell completes the commands and options of wholebody. It needs shtab:
-pip install 'wholebody[completion]'. The script itself needs nothing and costs no time when the command starts.""",
-        option("shell", choices=("bash", "zsh", "tcsh"), help="the shell"),
-        epilog="""\
-examples:
-  wholebody completion bash > ~/.local/share/bash-completion/completions/wholebody
-  wholebody completion zsh > ~/.zfunc/_wholebody""",
-    )(later("doctor.completion")),
 )

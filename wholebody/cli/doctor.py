@@ -1,4 +1,4 @@
-"""`wholebody doctor` and `completion`: this installation examined, and completed in a shell."""
+"""`wholebody doctor`: this installation examined."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import argparse
 from rich.markup import escape
 from rich.table import Table
 
-from wholebody.base.errors import MissingPackageError
-from wholebody.cli.main import parser
 from wholebody.cli.tables import console
 from wholebody.doctor import examine
 from wholebody.version import __version__
@@ -40,15 +38,3 @@ def doctor(arguments: argparse.Namespace) -> int:
     if report.healthy:
         shown.print("[green]nothing is wrong[/]")
     return 0 if report.healthy else 1
-
-
-def completion(arguments: argparse.Namespace) -> int:
-    """Print the script; raises MissingPackageError where shtab is not installed."""
-    try:
-        import shtab
-    except ImportError:
-        raise MissingPackageError(
-            "completion scripts need shtab, which is not installed; run: pip install 'wholebody[completion]'"
-        ) from None
-    print(shtab.complete(parser(), shell=arguments.shell))
-    return 0

@@ -13,7 +13,6 @@ from io import TextIOWrapper, UnsupportedOperation
 from typing import Any
 
 from wholebody.base.errors import WholebodyError
-from wholebody.base.imports import raise_again
 from wholebody.cli.arguments import Parser
 from wholebody.cli.commands import COMMANDS
 from wholebody.version import __version__
@@ -68,7 +67,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(given: list[str]) -> int:
     arguments = parser().parse_args(given)
-    raise_again()
     _tell_progress()
     with warnings.catch_warnings():
         warnings.showwarning = _show_warning

@@ -182,12 +182,6 @@ def unseen(problem: Problem, takes: Callable[[object], bool], *, contacts: bool 
     return (*([CONTACTS] if contacts and len(problem.clearances) else []), *defaults)
 
 
-def enumeration(names: Sequence[str]) -> str:
-    """Names as words: "contacts, Balance (by default) and ReachCones (by default)"."""
-    *before, last = names
-    return f"{', '.join(before)} and {last}" if before else last
-
-
 class FrameStep(NamedTuple):
     """Answer of one frame."""
 

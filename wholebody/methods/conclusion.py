@@ -15,6 +15,7 @@ import numpy as np
 
 from wholebody.assessment.posture import Assessment, judged
 from wholebody.base.arrays import Array, with_values
+from wholebody.base.errors import either
 from wholebody.figures.state import State
 from wholebody.methods.base import (
     CONTACTS,
@@ -23,7 +24,6 @@ from wholebody.methods.base import (
     SolvingTracker,
     UnsupportedTermError,
     check_problem,
-    enumeration,
 )
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import LONGEST, Control, Progress, errors_left
@@ -79,7 +79,7 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
     else:
         holds = judgement.holds(enough)
         status, why = proven(status, ending.contradictions, holds), in_words(ending.contradictions)
-    caveat = f"this method leaves out {enumeration(ending.left_out)}" if ending.left_out else ""
+    caveat = f"this method leaves out {either(ending.left_out, 'and')}" if ending.left_out else ""
     if why and caveat and not judgement.holds(enough):
         why += f"; {caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
@@ -115,7 +115,7 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     name, missed = _worst(problem, judgement, ending.q)
     why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     if (CONTACTS if name == PAIR else name) in ending.left_out:
-        why = f"this method leaves out {enumeration(ending.left_out)}"
+        why = f"this method leaves out {either(ending.left_out, 'and')}"
     return f"{why}: {name} is missed by {missed:.3g} m or rad"
 
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.checks import function, shown
-from wholebody.base.errors import InputError, UnknownNameError, WholebodyError, one_line
+from wholebody.base.errors import InputError, UnknownNameError, WholebodyError, either, one_line
 from wholebody.methods import METHODS
-from wholebody.methods.base import Method, check_problem, enumeration
+from wholebody.methods.base import Method, check_problem
 from wholebody.methods.control import Progress
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -82,7 +82,7 @@ def warn_of_left_out(method: Method, level: int, *problems: Problem) -> Method:
 def warn_of_names(method: Method, level: int, found: Iterable[str]) -> Method:
     """Say once what a method does not look at, by names that `left_out` found; `level` as in `warnings.warn`."""
     if names := [*dict.fromkeys(found)]:
-        said = f"method {method.name!r} leaves out {enumeration(names)}, which the assessment alone judges"
+        said = f"method {method.name!r} leaves out {either(names, 'and')}, which the assessment alone judges"
         warnings.warn(f"{said}; use method='qp'", stacklevel=level + 1)
     return method
 

@@ -148,7 +148,7 @@ class Fitter:
 
     def depth(self, q: Array) -> float:
         """The deepest overlap at a posture (nq,), metres; 0 without one."""
-        return -float(self._workspace.near(q, 0.0).distance.min(initial=0.0))
+        return self._workspace.deepest(q)
 
     def deepest(self, q: Array) -> tuple[str, str]:
         """What the pair that overlaps most at a posture (nq,) is part of."""

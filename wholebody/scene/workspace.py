@@ -164,9 +164,9 @@ class Workspace(NotCopyable):
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
         return self.proximity.query(self.state.update(q).data, within, most)
 
-    def near_views(self, q: Array, within: float) -> Contacts:
-        """What `near` returns, in arrays that the next call of this overwrites."""
-        return self.proximity.query_views(self.state.update(q).data, within)
+    def deepest(self, q: Array) -> float:
+        """Depth of the deepest overlap at the posture q, shape (nq,), metres; 0 without one."""
+        return -float(self.near(q, 0.0).distance.min(initial=0.0))
 
     def least_gap(self, q: Array, clearances: Array, within: float) -> float:
         """The least of distances less clearances (pairs,) at q (nq,), of pairs nearer than `within`, inf without any.

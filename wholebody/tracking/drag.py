@@ -140,11 +140,11 @@ class ProblemDrag:
         """Move by the longest free motion of `GoalMoves`, or out of a thing moved into the figure; the iterations."""
         spent, tried = 0, list[Array]()
         # m: depth of an overlap that the tracker itself does not lead out of
-        deep = 0.0 if self.tracker.leaves_overlap else _depth(self.workspace, self.q)
+        deep = 0.0 if self.tracker.leaves_overlap else self.workspace.deepest(self.q)
         deep = deep if deep > GRAZE else 0.0
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
-            if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self.workspace, q) <= GRAZE):
+            if self._is_free(q, self.tracker.unswept) and (not deep or self.workspace.deepest(q) <= GRAZE):
                 self.q = q
                 break
             tried.append(q)
@@ -177,7 +177,7 @@ class ProblemDrag:
     def _leave(self, tried: list[Array], deep: float) -> None:
         """Move out of an overlap of `deep` metres: by a free motion, else to the shallower end."""
         ends = [*self.tracker.overlap_resolutions(self.q), *tried]
-        depths = [_depth(self.workspace, q) for q in ends]
+        depths = [self.workspace.deepest(q) for q in ends]
         out = [
             (not self._is_free(q, 0.0), depth, number)
             for number, (depth, q) in enumerate(zip(depths, ends, strict=True))
@@ -185,11 +185,6 @@ class ProblemDrag:
         ]
         if out:
             self.q = ends[min(out)[2]]
-
-
-def _depth(workspace: Workspace, q: Array) -> float:
-    """Depth of the deepest overlap at a posture (nq,), metres."""
-    return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
 
 
 class AssemblyDrag:

@@ -58,8 +58,6 @@ def test_the_command_writes_a_table(tmp_path: Path) -> None:
         "bench",
         "world",
         "--quick",
-        "--parts",
-        "drops",
         "--only",
         "ball",
         "--engines",
@@ -68,5 +66,5 @@ def test_the_command_writes_a_table(tmp_path: Path) -> None:
         str(tmp_path),
     ]
     assert main(run) == 0
-    assert (tmp_path / "world-drops.csv").read_text().count("ball,wholebody") == 1
+    assert (tmp_path / "world.csv").read_text().count("ball,wholebody") == 1
     assert "| ball | wholebody |" in (tmp_path / "world.md").read_text()

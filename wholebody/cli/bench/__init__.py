@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from wholebody.cli.arguments import JOBS
-from wholebody.cli.bench.command import CLIPS, folders, listed, measuring, quick, seed
-from wholebody.cli.command import Group, command, count, flag, later, path, real, text, whole
+from wholebody.cli.bench.command import CLIPS, listed, measuring, out, quick, seed
+from wholebody.cli.command import Group, command, count, later, path, real, text, whole
 
 group = Group(
     "bench",
@@ -20,7 +20,6 @@ on the machine and on what else runs on it: compare ratios of one run.""",
 Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
 (report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. Call an
 interrupted run again with the same settings and folder to continue it; a finished one writes its report again.
---held-out adds uniform witnesses, other people, other clutter and other robots beside the sets of the same questions.
 --again compares times in units of a reference kernel; the exit code is 1 if the solved problems differ. --jobs solves
 cases in parallel by joblib, --cluster on a dask cluster.""",
             quick("20 problems a set, within three minutes on two cores"),
@@ -35,9 +34,8 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
             real("--minutes", "N", "of solving in all (default: 25; with --quick 2)"),
             seed("of all problems"),
             *JOBS,
-            flag("--held-out", "pose problems of distributions that no constant was tuned on"),
             path("--again", "LOCK.json", "repeat the comparison that left this file"),
-            *folders("out/compare"),
+            out("out/compare"),
         )(later("bench.comparing.compare")),
         command(
             "export",
@@ -122,10 +120,8 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
         )(later("bench.measurements.measure_motion")),
         measuring(
             "world",
-            "things that move by themselves: throws at a person, drops beside MuJoCo and Rapier",
-            "Throw things at a person who stands, walks or is dragged; drop, slide and stack the same things in "
-            "wholebody, MuJoCo and Rapier. The whole takes about ten minutes of one processor.",
-            listed("--parts", "throws, drops (default: all)", "PART"),
+            "things that move by themselves, beside MuJoCo and Rapier",
+            "Drop, slide and stack the same things in wholebody, MuJoCo and Rapier.",
             listed("--only", "names of drops (default: all)", "DROP"),
             listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
         )(later("bench.measurements.measure_world")),
@@ -137,8 +133,6 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
             "time.",
             path("folder", "FOLDER", "of the files"),
             count("--frames", 60, "frames of each recording that are retargeted"),
-            flag("--compare", "recordings alone (BVH): by wholebody, and by mink frame by frame with GMR's weights"),
-            listed("--figure", "with --compare: figures that follow (default: the person)", "FIGURE"),
         )(later("bench.measurements.measure_files")),
         command(
             "attack",
@@ -155,7 +149,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
             count("--cases", None, "end after as many cases, if the time suffices"),
             listed("--kinds", "of cases, such as solve, stream, own-term, sleeper, file (default: all)", "KIND"),
             count("--jobs", 1, "processes at a time"),
-            *folders("out/attack"),
+            out("out/attack"),
         )(later("bench.hard_cases.attack")),
     ),
     title="what to measure",

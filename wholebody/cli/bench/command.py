@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.bench.tables import publish_text, write_rows, write_text
+from wholebody.bench.tables import write_rows, write_text
 from wholebody.cli.command import Command, Measure, Option, command, count, flag, option, path
 
 
 def measuring(name: str, help: str, description: str, *options: Option) -> Callable[[Measure], Command]:
-    """The same with `--quick`, `--out` and `--update-docs`."""
+    """The same with `--quick` and `--out`."""
     return command(
-        name, help, description, quick("a short run that shows whether all works"), *folders("out/bench"), *options
+        name, help, description, quick("a short run that shows whether all works"), out("out/bench"), *options
     )
 
 
@@ -24,13 +23,9 @@ def quick(help: str) -> Option:
     return flag("--quick", help)
 
 
-def folders(out: str) -> tuple[Option, Option]:
-    """`--out`, with a folder where it is left out, and `--update-docs`."""
-    told = "write tables and charts into the documentation too (default folder: docs)"
-    return (
-        path("--out", "DIR", f"folder (default: {out})", default=Path(out)),
-        path("--update-docs", "DOCS", told, nargs="?", const=Path("docs")),
-    )
+def out(folder: str) -> Option:
+    """`--out`, with a folder where it is left out."""
+    return path("--out", "DIR", f"folder (default: {folder})", default=Path(folder))
 
 
 def listed(name: str, help: str, metavar: str | None = "NAME", **settings: Any) -> Option:
@@ -64,19 +59,15 @@ def publish(
     facts: Mapping[str, str] | None = None,
     tables: Mapping[str, Sequence[Any]] | None = None,
     charts: Mapping[str, Chart] | None = None,
-    page: str | None = "results.md",
 ) -> None:
-    """Write tables and report, then charts, and both into the documentation where that is asked for."""
-    # Measurements come first. `page` gets charts and the first table; None: only the report's file.
+    """Write tables and report, then charts, which the report shows at its end."""
+    # Measurements come first.
     for table, rows in (tables or {}).items():
         write_rows(arguments.out / f"{table}.csv", facts or {}, rows)
-    write_text(arguments.out / f"{name}.md", report + "\n")
+    file = arguments.out / f"{name}.md"
+    write_text(file, report + "\n")
     print(report)
-    drawn = [(chart.draw(arguments.out / file), chart.caption) for file, chart in (charts or {}).items()]
+    drawn = [(chart.draw(arguments.out / chart_name), chart.caption) for chart_name, chart in (charts or {}).items()]
+    if drawn:
+        write_text(file, "\n\n".join([report, *(f"![{caption}]({svg.name})" for (svg, _), caption in drawn)]) + "\n")
     print(f"wrote {arguments.out}")
-    if arguments.update_docs is None:
-        return
-    pictures = [f"![{caption}](assets/bench/{svg.name})" for (svg, _), caption in drawn]
-    print(f"wrote {publish_text(arguments.update_docs, name, report, page, pictures)}")
-    for (svg, _), _ in drawn:
-        shutil.copyfile(svg, arguments.update_docs / "assets" / "bench" / svg.name)

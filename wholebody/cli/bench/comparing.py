@@ -13,10 +13,10 @@ from wholebody.bench.suite.adapters.registry import adapters, missing
 from wholebody.bench.suite.compare import own_task
 from wholebody.bench.suite.compare import run as comparison
 from wholebody.bench.suite.compare.lock import differences, in_words, locked, read_lock, shares
-from wholebody.bench.suite.compare.report import PAGE, publish, to_docs
+from wholebody.bench.suite.compare.report import PAGE, publish
 from wholebody.bench.suite.compare.run import QUICK, Settings
 from wholebody.bench.suite.compare.summary import advice
-from wholebody.bench.suite.problem_sets.registry import CASES, SETS, beside, problem_set
+from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.tables import bar, print_rows
 from wholebody.taskfile import read_task
@@ -40,8 +40,6 @@ def compare(arguments: argparse.Namespace) -> int:
             settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(),
             lambda what: tell(1.0, f"making {what}"),
         )  # fmt: skip
-    if arguments.update_docs is not None:
-        to_docs(given, arguments.out, arguments.update_docs, "held-out" if arguments.held_out else "compare")
     for sentence in advice(given.results, given.rows):
         print("- " + sentence.replace("**", "").replace("`", ""))
     print(f"wrote {arguments.out / PAGE}")
@@ -53,10 +51,7 @@ def _facts(beside: str) -> dict[str, str]:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    if arguments.held_out:
-        _alone(arguments, "held_out", ("sets",))
-    named = arguments.sets or (beside(print) if arguments.held_out else SETS)
-    sets = tuple(problem_set(name) for name in dict.fromkeys(named))
+    sets = tuple(problem_set(name) for name in dict.fromkeys(arguments.sets or SETS))
     chosen = None if arguments.methods is None else tuple(dict.fromkeys(arguments.methods))
     amounts: dict[str, Any] = dict(QUICK) if arguments.quick else {"cases": CASES}
     asked = {"cases": arguments.cases, "minutes": arguments.minutes}
@@ -71,10 +66,10 @@ def _alone(arguments: argparse.Namespace, flag: str, others: tuple[str, ...]) ->
             raise InputError(f"--{name.replace('_', '-')} does not go with --{flag.replace('_', '-')}; leave one out")
 
 
-OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster", "held_out", "update_docs")
+OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster")
 """Options that a repeated comparison reads from its lock file, or does not have."""
 
-OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs", "again", "held_out")
+OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "again")
 """Options that say how much of the sets is compared, or where; a task has one problem and takes none of them."""
 
 

@@ -35,7 +35,7 @@ def stability(arguments: argparse.Namespace) -> None:
     text = report(found, facts)
     charts = {"stability": Chart(partial(matrix, found), "Cases by methods: a colour and a sign a cell")}
     tables = {"stability": found.rows}
-    publish("stability", text, arguments, facts=facts, tables=tables, charts=charts, page="where-methods-fail.md")
+    publish("stability", text, arguments, facts=facts, tables=tables, charts=charts)
 
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
@@ -70,6 +70,5 @@ def attack(arguments: argparse.Namespace) -> int:
         raise InputError("no case ended; give more --seconds")
     rows.sort(key=lambda one: one["number"])
     facts = machine()
-    text, page = running.report(rows, facts), "where-methods-fail.md"
-    publish("attack", text, arguments, facts=facts, tables={"attack": rows}, page=page)
+    publish("attack", running.report(rows, facts), arguments, facts=facts, tables={"attack": rows})
     return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C

@@ -10,15 +10,14 @@ from pathlib import Path
 
 from wholebody.base import checks
 from wholebody.base.errors import InputError
-from wholebody.base.files import make_folder
 from wholebody.bench.measure import motion, scaling, step
-from wholebody.bench.measure.files import ABOUT, compare, read, totals
+from wholebody.bench.measure.files import read
 from wholebody.bench.measure.motion import EQUIPMENT, SYNTHETIC, recorded, recordings, synthetic
 from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
-from wholebody.bench.measure.world import ENGINES, all_throws, drops, installed, measure, throw_summary
+from wholebody.bench.measure.world import ENGINES, drops, installed, measure
 from wholebody.bench.rows import Panel, Row, across, chart, in_words, only, report, texts
 from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
-from wholebody.bench.tables import machine, write_rows
+from wholebody.bench.tables import machine
 from wholebody.cli.bench.command import Chart, publish
 from wholebody.figures import load
 from wholebody.motion.avoidance import METHODS
@@ -57,7 +56,7 @@ def measure_step(arguments: argparse.Namespace) -> None:
     text = step.step_report(spent, judged, facts, bool(figures), notes)
     rows = {f"{name}-time": spent, f"{name}-result": judged}
     charts = _charts(name, step.panels(runs), "Share of steps within a time, and least distance of any pair")
-    publish(name, text, arguments, facts=facts, tables=rows, charts=charts, page=None if figures else "results.md")
+    publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
 
 
 def measure_scaling(arguments: argparse.Namespace) -> None:
@@ -108,51 +107,23 @@ def measure_motion(arguments: argparse.Namespace) -> None:
     publish("motion", motion.motion_report(cases, facts), arguments, charts=charts)
 
 
-WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engines"}
-"""Parts of `wholebody bench world`, and the titles of their tables."""
-
-
-def measure_world(arguments: argparse.Namespace) -> int:
-    """Measure; --quick takes three drops for half a second, and one throw of each kind."""
-    found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
-    given = _world(arguments)
-    make_folder(arguments.out)
-    facts = machine()
-    for part, rows in found.items():
-        for row in given[part]:
-            rows.append(row)
-            print(in_words(row))
-            write_rows(arguments.out / f"world-{part}.csv", facts, rows)
-    shown = dict(found)
-    if "throws" in found:
-        shown["throws"] = throw_summary(found["throws"])
-    if "drops" in found:
-        shown["drops"] = only(found["drops"], "median ms", "p99 ms", "deepest mm", "largest gain of energy")
-    publish("world", report(texts()["world"], {WORLD[part]: rows for part, rows in shown.items()}, facts), arguments)
-    return int(any(row["silent"] for row in found.get("throws", ())))
-
-
-def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
-    """What measures each part; names are checked before anything is measured."""
-    quick = arguments.quick
+def measure_world(arguments: argparse.Namespace) -> None:
+    """Measure; --quick takes three drops for half a second."""
     known = {drop.name: drop for drop in drops()}
-    names = chosen(arguments.only, known, "--only")[: 3 if quick else None]
+    names = chosen(arguments.only, known, "--only")[: 3 if arguments.quick else None]
     tools = installed(chosen(arguments.engines, ENGINES, "--engines"))
-    frames = 30 if quick else None
-    return {
-        "throws": all_throws(1 if quick else 3, quick),
-        "drops": (measure(known[name], tool, frames) for name, tool in product(names, tools)),
-    }
+    facts, rows = machine(), list[Row]()
+    for name, tool in product(names, tools):
+        rows.append(measure(known[name], tool, 30 if arguments.quick else None))
+        print(in_words(rows[-1]))
+    shown = only(rows, "median ms", "p99 ms", "deepest mm", "largest gain of energy")
+    publish("world", report(texts()["world"], {"": shown}, facts), arguments, facts=facts, tables={"world": rows})
 
 
 def measure_files(arguments: argparse.Namespace) -> int:
     """Read; 1 where a file ends in anything but an answer or a sentence."""
     if not arguments.folder.is_dir():
         raise InputError(f"{arguments.folder}: is no folder; give one with files")
-    if arguments.compare:
-        return _compared(arguments)
-    if arguments.figure is not None:
-        raise InputError("--figure is for --compare; recordings are read for the person")
     rows = []
     for row in read(arguments.folder, 5 if arguments.quick else arguments.frames):
         rows.append(row)
@@ -161,20 +132,5 @@ def measure_files(arguments: argparse.Namespace) -> int:
     known = [row["bones median deg"] for row in rows if "bones median deg" in row.figures]
     about = f"{sum(row['read'] == 'yes' for row in rows)} of {len(rows)} files are read; {len(known)} recordings are "
     about += f"retargeted, {sum(error < 5.0 for error in known)} of them with a median error of bones below 5 degrees."
-    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows}, page=None)
+    publish("files", report(about, {"": rows}, facts), arguments, facts=facts, tables={"files": rows})
     return int(any(row["read"] == "FAULT" for row in rows))
-
-
-def _compared(arguments: argparse.Namespace) -> int:
-    """Follow recordings by both tools; figures of files may go about freely."""
-    names = arguments.figure or ["human"]
-    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
-    rows = []
-    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
-        rows.append(row)
-        print(in_words(row), flush=True)
-    facts = machine() | {"frames": str(arguments.frames)}
-    tables = {"All clips": totals(rows), "Each": rows}
-    text = report(ABOUT, tables, facts)
-    publish("clips", text, arguments, facts=facts, tables={"clips": rows}, page=None)
-    return 0

@@ -138,7 +138,7 @@ class QPTracker(SolvingTracker):
                 following = motion.next_share(share, workspace.near(here, self._query_distance), self._query_distance)
                 workspace.place(motion.placements(following))
             else:
-                following, depth = share, -float(workspace.near(here, 0.0).distance.min(initial=0.0))
+                following, depth = share, workspace.deepest(here)
                 if depth <= TRACKING.out or depth > TRACKING.worth * before or len(steps) > MOST_SHARES:
                     break
                 before = depth

@@ -13,7 +13,6 @@ from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.compare import report
 from wholebody.bench.suite.compare.lock import read_lock
-from wholebody.bench.suite.problem_sets.registry import beside
 
 run = partial(bench, "compare")
 
@@ -49,15 +48,3 @@ def test_what_cannot_be_is_refused_before_anything_is_computed(tmp_path: Path) -
         with pytest.raises(InputError, match="give 1 or more"):
             run(option, "0", "--out", str(tmp_path / "c"))
     assert not list(tmp_path.iterdir())
-
-
-def test_held_out_sets_stand_beside_those_of_the_same_question(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("WHOLEBODY_ROBOTS", raising=False)
-    said: list[str] = []
-    assert beside(said.append) == (
-        "uniform_witnesses", "other_people", "other_clutter", "arms_among_things", "free_reach_several", "clutter",
-        "robot_arm",
-    )  # fmt: skip
-    assert "WHOLEBODY_ROBOTS" in said[0]
-    with pytest.raises(InputError, match="does not go with --held-out"):
-        run("--held-out", "--sets", "clutter")

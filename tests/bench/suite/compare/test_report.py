@@ -39,9 +39,6 @@ def asked(fakes: ModuleType) -> Settings:
 def folder(asked: Settings, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a run of two cases whose records are made by hand, with its report."""
     place = tmp_path_factory.mktemp("report")
-    docs = place / "docs"
-    docs.mkdir()
-    (docs / "results.md").write_text("before\n<!-- bench:compare -->\nold\n<!-- /bench:compare -->\nafter\n")
     store = Store(place / "out", asked.described())
     for number in range(2):
         records = [record("solves", number, 10.0**-k, 0.01 * k, 10.0**-k / 2) for k in (2, 4, 6)]
@@ -50,8 +47,7 @@ def folder(asked: Settings, tmp_path_factory: pytest.TempPathFactory) -> Path:
         records.append(Record("arm", number, "hangs", 1e-4, 0, OVERTIME, said="ended after 20 s"))
         store.add(f"arm {number}", Chunk("arm", number, tuple(records)))
     missing = {"mink": "pip install 'wholebody[compare]'"}
-    given = publishing.publish(asked, store, place / "out", FACTS, missing)
-    publishing.to_docs(given, place / "out", docs)
+    publishing.publish(asked, store, place / "out", FACTS, missing)
     return place
 
 
@@ -101,13 +97,10 @@ def test_the_report_says_what_was_left_out_and_why(folder: Path) -> None:
     assert "If in doubt, take <code>solves</code>" in page
 
 
-def test_the_page_of_results_gets_its_part(folder: Path) -> None:
-    page = (folder / "docs" / "results.md").read_text()
-    assert page.startswith("before\n<!-- bench:compare -->")
-    assert page.endswith("<!-- /bench:compare -->\nafter\n")
-    assert "\nold\n" not in page
-    for name in re.findall(r"\]\((assets/bench/[^)]+)\)", page):
-        assert (folder / "docs" / name).is_file()
+def test_the_charts_of_the_report_are_there(folder: Path) -> None:
+    names = re.findall(r"\]\((charts/[^)]+)\)", (folder / "out" / "compare.md").read_text())
+    assert any("overview" in name for name in names)
+    assert all((folder / "out" / name).is_file() for name in names)
 
 
 @pytest.mark.parametrize("span", [(2.0, 30.0), (1.0, 900.0), (0.01, 20000.0)])

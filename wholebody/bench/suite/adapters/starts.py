@@ -24,7 +24,6 @@ from wholebody.methods.control import Progress
 from wholebody.methods.differential import NEGLIGIBLE
 from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
-from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
 
 STARTS, ONE = "starts", "one_start"
@@ -102,12 +101,12 @@ def starts(problem: Problem) -> Iterator[Array]:
     figure, rng = problem.scene.figure, np.random.default_rng(0)
     moving = movable(problem)
     with problem.borrow() as workspace:
-        deepest = _depth(workspace, problem.start) + 1e-4  # m: by which a start may overlap more than the problem's own
+        deepest = workspace.deepest(problem.start) + 1e-4  # m: by which a start may overlap more than the problem's own
         failures = 0
         for drawn in restarts(problem, workspace.state, problem.start, rng, sys.maxsize):
             move = np.where(moving, pin.difference(figure.model, problem.start, drawn), 0.0)
             start: Array = figure.clamp(np.asarray(pin.integrate(figure.model, problem.start, move)))
-            failures = 0 if _depth(workspace, start) <= deepest else failures + 1
+            failures = 0 if workspace.deepest(start) <= deepest else failures + 1
             if not failures:
                 yield start
             # of 40 random postures none is free of overlap: the next one is drawn
@@ -129,10 +128,6 @@ def movable(problem: Problem) -> Array:
                 found[at.idx_v : at.idx_v + at.nv] = False
                 joint = model.parents[joint]
     return found
-
-
-def _depth(workspace: Workspace, q: Array) -> float:
-    return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
 
 
 def _rank(solution: Solution) -> tuple[bool, float, float]:

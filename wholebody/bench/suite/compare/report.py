@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -31,7 +30,7 @@ from wholebody.bench.suite.compare.summary import (
     reference,
     standings,
 )
-from wholebody.bench.tables import page, publish_text, render, write_rows, write_text
+from wholebody.bench.tables import page, render, write_rows, write_text
 
 
 def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:
@@ -138,7 +137,7 @@ def publish(
     titles = {family.name: family.title for family in settings.sets}
     charts = {name: svg for name, (svg, _) in draw_all(given.results, given.rows, titles, folder / "charts").items()}
     say("report")
-    text = as_markdown(given, "charts")
+    text = as_markdown(given)
     write_text(folder / "compare.md", text + "\n")
     counts = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves."
     subtitle = f"{counts} Measured {facts.get('date', '')} on {facts.get('processor', '')}."
@@ -146,27 +145,14 @@ def publish(
     return given
 
 
-def to_docs(given: Material, folder: Path, docs: Path, section: str = "compare") -> None:
-    """Write report, charts and lock file into the documentation, the table of "compare" into the page of results."""
-    pictures = [
-        f"![Every set: {', '.join(methods)}](assets/bench/{chart_name('overview', number)}.svg)"
-        for number, methods in enumerate(groups(given.results.adapters))
-    ]
-    publish_text(docs, section, as_markdown(given, "."), "results.md" if section == "compare" else None, pictures)
-    assets = docs / "assets" / "bench"
-    write_lock(assets / f"{section}-{LOCK}", locked(given))
-    for svg in (folder / "charts").glob("*.svg"):
-        shutil.copyfile(svg, assets / svg.name.replace("compare-", f"{section}-", 1))
-
-
-def as_markdown(given: Material, charts: str) -> str:
-    """The report as Markdown; `charts` is the folder of the charts."""
+def as_markdown(given: Material) -> str:
+    """The report as Markdown; its charts are in the folder `charts`."""
     results, ranked = given.results, standings(given.results, given.rows)
     leading: dict[str, Standing] = {}  # the best of each algorithm
     for one in ranked:
         leading.setdefault(re.split(r"[/,+ ]", one.method)[0], one)
     return render(
-        "compare.md", given=given, leading=list(leading.values()), charts=charts, advice=advice(results, given.rows),
+        "compare.md", given=given, leading=list(leading.values()), charts="charts", advice=advice(results, given.rows),
         picked=choices(results, given.rows),
         ranked=ranked, reference=reference(results), named=named, chart=chart_name,
         groups=groups(results.adapters), counts=[row.cases for row in given.rows],

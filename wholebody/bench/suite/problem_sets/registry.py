@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
 
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.errors import UnknownNameError
 from wholebody.bench.suite.problem_sets import drivers, grips, hands, reaching, robots
 from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
@@ -46,24 +46,9 @@ NAMED = _sets(
         "two_figures": robots.two_figures,
     }
 )
-"""Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
-that are not a part of this package; free arms; drivers and hands, whose contacts most other tools and files lack; and
-two figures, where most tools know one robot."""
-
-TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if numbers(name).beside})
-"""Those distributions -> the set of the same question that constants were tuned on."""
-
-
-def beside(say: Callable[[str], object]) -> tuple[str, ...]:
-    """Names of the held-out sets and of those beside them; `say` is called with why robots are left out."""
-    names = list(TUNED_ON)
-    try:
-        robots.folder()
-    except InputError as error:
-        say(str(error))
-        names.remove("robots")
-    return (*names, *dict.fromkeys(TUNED_ON[name] for name in names))
-
+"""Sets that take part where they are named: distributions that nothing was tuned on, the first four and the robots,
+which need files that are not a part of this package; free arms; drivers and hands, whose contacts most other tools and
+files lack; and two figures, where most tools know one robot."""
 
 CASES = 200  # problems of a set, if nothing else is asked for
 

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.audits.clips import compare, judged, totals
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
-from wholebody.bench.measure.files import compare, judged, totals
 from wholebody.bench.rows import Row
 from wholebody.motion.roles import matched
 from wholebody.motion.stance import point_paths
