@@ -191,6 +191,21 @@ def test_a_clearance_that_is_missed_counts_as_something_in_the_way(arm):
         assert wb.assess(problem, found(problem).q).clearance_violation == 0.0
 
 
+def test_arms_that_hold_each_other_are_brought_to_a_goal(arm):
+    scene = wb.Scene({"one": arm, "other": (arm, (0.7, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0))})
+    figure, rng = scene.figure, np.random.default_rng(5)
+    witnesses = rng.uniform(figure.model.lowerPositionLimit, figure.model.upperPositionLimit, (40, figure.model.nq))
+    free = [q for q in witnesses if not scene.penetration(q)]
+    assert len(free) > 5
+    for q in free:
+        goal, held = (place_of(figure, q, f"{name}/tip") for name in ("one", "other"))
+        grip = wb.Hold("other/tip", at=goal.inverse() * held, relative_to="one/tip")
+        met = found(wb.Problem(scene, goals=[wb.Frame("one/tip", goal)], constraints=[grip]))
+        assert met is not None
+        for name, place in (("one", goal), ("other", held)):
+            assert np.linalg.norm(pin.log6(place.actInv(place_of(figure, met.q, f"{name}/tip"))).vector) < 1e-5
+
+
 def test_goals_out_of_reach_are_left_to_the_search(arm):
     problem = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", (3.0, 0.0, 0.5))])
     assert found(problem) is None
@@ -206,6 +221,7 @@ def test_what_it_does_not_know_it_does_not_take(arm):
         "a point": (True, wb.Problem(scene, START, goals=[point])),
         "two goals": (True, wb.Problem(scene, START, goals=[point, wb.Orientation("tip", np.eye(3))])),
         "no goals": (False, wb.Problem(scene, START)),
+        "a hold": (True, wb.Problem(scene, START, goals=[point], constraints=[wb.Hold("tip", orientation=False)])),
         "an axis": (False, wb.Problem(scene, START, goals=[point, wb.Axis("tip", (0, 0, 1), toward=(1.0, 0.0, 0.0))])),
         "a frozen joint": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Freeze("base")])),
         "a plane": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Plane("tip", normal=(0, 0, 1))])),
