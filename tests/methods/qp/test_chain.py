@@ -18,7 +18,6 @@ from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.qp import chain_kernel
 from wholebody.methods.qp.chain import from_seeds, goal_entries
-from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
 from wholebody.methods.qp.settings import Settings
 from wholebody.tasks.base import Goal
@@ -65,7 +64,7 @@ def test_joints_are_where_pinocchio_has_them():
         place = pin.SE3(turn * np.sign(np.linalg.det(turn)), rng.normal(size=3))
         model.addJoint(parent, kind, place, f"joint {number}")
     chain = whole_chain(model, Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))))
-    state, room, goals = State(model), chain.room(0), Goals(np.zeros((0, 36)), np.zeros((0, 6), dtype=np.int64))
+    state, room, goals = State(model), chain.room(0), chain.goals([])
     for _ in range(20):
         q = rng.uniform(-3.0, 3.0, model.nq)
         chain_kernel.evaluate(chain.chain, goals, room, q)
@@ -78,11 +77,12 @@ def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
     """By central differences of the errors that the goals themselves compute, one goal relative to the other arm."""
     rng = np.random.default_rng(5)
     start = rng.uniform(-1.0, 1.0, 7)
-    goals = [random_goal(two_arms, "left", rng, True), wb.Relative("right", "left", (0.1, 0.2, 0.3))]
+    goals = [random_goal(two_arms, "left", rng, True), wb.Axis("left", (1, 2, 3), direction=(0, 1, 1)),
+             wb.Axis("right", (1, 0, 0), toward=(0.1, 0.2, 0.9)), wb.Relative("right", "left", (0.1, 0.2, 0.3))]  # fmt: skip
     problem = wb.Problem(wb.Scene(two_arms), start, goals=goals)
     chain, kernel = whole_chain(two_arms.model, two_arms.limits), chain_kernel
     entries = chain.goals(goal_entries(problem))
-    room = chain.room(12)
+    room = chain.room(16)
     kernel.evaluate(chain.chain, entries, room, start)
     kernel.rows_of(chain.chain, entries, room)
     state = State(two_arms.model)
@@ -222,7 +222,7 @@ def test_what_it_does_not_know_it_does_not_take(arm):
         "two goals": (True, wb.Problem(scene, START, goals=[point, wb.Orientation("tip", np.eye(3))])),
         "no goals": (False, wb.Problem(scene, START)),
         "a hold": (True, wb.Problem(scene, START, goals=[point], constraints=[wb.Hold("tip", orientation=False)])),
-        "an axis": (False, wb.Problem(scene, START, goals=[point, wb.Axis("tip", (0, 0, 1), toward=(1.0, 0.0, 0.0))])),
+        "an axis": (True, wb.Problem(scene, START, goals=[point, wb.Axis("tip", (0, 0, 1), toward=(1.0, 0.0, 0.0))])),
         "a frozen joint": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Freeze("base")])),
         "a plane": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Plane("tip", normal=(0, 0, 1))])),
         "a goal of one's own": (False, wb.Problem(scene, START, goals=[Own("tip", (0.4, 0.2, 0.6))])),

@@ -24,7 +24,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
-from wholebody.terms.entries import RESIDUAL, Entry, entries_of
+from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
 
 
 class Met(NamedTuple):
@@ -57,13 +57,13 @@ def chains_of(problem: Problem) -> Pool[Chains]:
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
-    """Entries of goals and holds, where they are places and rotations and nothing else must hold; None otherwise."""
+    """Entries of goals and holds, if places, rotations and axes are all that must hold; None otherwise."""
     if problem.bounds or not problem.goals or not all(type(one) is tasks.Hold for one in problem.constraints):
         return None
     found: list[Entry] = []
     for term in (*problem.goals, *problem.constraints):
         entries = entries_of(term, problem.scene.model)
-        if entries is None or any(entry.table != RESIDUAL for entry in entries):
+        if entries is None or any(entry.table not in (RESIDUAL, AXIS) for entry in entries):
             return None
         found += entries
     return found

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.assessment.posture import Judged, Numbers, judged_postures
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.methods.conclusion import assessed_tolerance
 from wholebody.methods.control import Control
@@ -221,7 +221,7 @@ class _First:
     def descents(self, k: int, workspace: Workspace) -> Descents:
         """What goes on from there for one problem."""
         batch = self.batch
-        goals = Goals(batch.tables[k], self.goals.entries)
+        goals = with_values(self.goals, tables=batch.tables[k])
         asked = Asked(goals, self.at[k], self.nearest[k], batch.numbers.clearances[k])
         workspace.begin()
         return Descents(asked, self.chain, self.rule, workspace, batch.settings, Control(np.inf))

@@ -12,7 +12,7 @@ from wholebody.base.compiled import compiled
 from wholebody.base.dense_kernel import copy, dot, gram, solve
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
 from wholebody.terms.entries import Integers
-from wholebody.terms.residual_kernel import residuals
+from wholebody.terms.residual_kernel import axis_errors, residuals
 
 CLEARLY, NEAR = 1.25, 0.3
 """An end of less than this many radians or metres away is left where it will take this many times another's effort."""
@@ -33,10 +33,12 @@ class Chain(NamedTuple):
 
 
 class Goals(NamedTuple):
-    """Goals of places and rotations, as in `terms.entries.RESIDUAL`, with the numbers of the chain's joints."""
+    """Goals as in `terms.entries.RESIDUAL` and `terms.entries.AXIS`, with the numbers of the chain's joints."""
 
-    tables: Array  # (e, 36) their floats
+    tables: Array  # (e, 36) floats of places and rotations
     entries: Integers  # (e, 6) their integers
+    axis_tables: Array  # (a, 24) floats of axes
+    axis_entries: Integers  # (a, 3) their integers
 
 
 class Room(NamedTuple):
@@ -330,22 +332,30 @@ def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
         columns[k, 1] = joints[c, 3, 2] * x - joints[c, 3, 0] * z
         columns[k, 2] = joints[c, 3, 0] * y - joints[c, 3, 1] * x
     residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
+    for e in range(len(goals.axis_entries)):
+        room.wrench[goals.axis_entries[e, 0] : goals.axis_entries[e, 0] + 2] = 0.0  # of a direction no force is written
+    axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)
 
 
 @compiled(error_model="numpy")
 def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
     """Rows of the goals: the rates at which their wrenches work on the motion of a joint relative to another."""
-    entries, support = goals.entries, chain.support
+    entries, axes, support = goals.entries, goals.axis_entries, chain.support
     for e in range(len(entries)):
         for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
             for k in range(len(room.columns)):
                 moved = support[entries[e, 1], k] - support[entries[e, 2], k]
                 room.jacobian[r, k] = moved * dot(room.wrench[r], room.columns[k]) if moved != 0 else 0.0
+    for e in range(len(axes)):
+        for r in range(axes[e, 0], axes[e, 0] + 2):
+            for k in range(len(room.columns)):
+                moves = support[axes[e, 1], k] != 0
+                room.jacobian[r, k] = dot(room.wrench[r], room.columns[k]) if moves else 0.0
 
 
 @compiled(error_model="numpy", nogil=True)
 def reach_all(
-    bodies: tuple[Chain, Arm, Room], asked: Array, goals: tuple[Array, NDArray[np.int64]], samples: tuple[int, int],
+    bodies: tuple[Chain, Arm, Room], asked: Array, goals: tuple[Array, Goals], samples: tuple[int, int],
     nearest: Array, ends: Array, found: Array, counts: Indices,
 ) -> None:  # fmt: skip
     """Do for each of k problems what `reach` does, from given seeds and then the branches of its closed form.
@@ -353,7 +363,7 @@ def reach_all(
     Args:
         bodies: the joints; the arm that they are, without joints where it has no closed form; room, written.
         asked: (5,) as in `reach`.
-        goals: floats (k, e, 36) and integers (e, 6) of the goals.
+        goals: floats (k, e, 36) of their places and rotations, and the goals of one, which has the other numbers.
         samples: how many of the joint that the closed form holds, and how many where none of these is within limits.
         nearest: (k, 2, n) as in `reach`.
         ends: (k, m, n) the given seeds; written: where descents end.
@@ -361,14 +371,14 @@ def reach_all(
         counts: (k,) of given seeds; written: of those that were taken, -1 for more than there is room for.
     """
     chain, arm, room = bodies
-    tables, integers = goals
+    tables, alike = goals
     size, most, limits = len(chain.lower), ends.shape[1], (chain.lower, chain.upper)
     branch, effort = np.empty((samples[1], BRANCHES, size)), np.empty((samples[1], BRANCHES))
     every = most + samples[1] * BRANCHES
     order, seeds = np.empty(samples[1] * BRANCHES, dtype=np.intp), np.empty((every, size))
     met, expected = np.empty((every, 4)), np.zeros(every)
     for p in range(len(tables)):
-        one = Goals(tables[p], integers)
+        one = Goals(tables[p], alike.entries, alike.axis_tables, alike.axis_entries)
         if not len(arm.joints):
             given = ends[p, : counts[p]]
             counts[p] = reach(chain, one, room, given, nearest[p], asked, expected, found[p])

@@ -19,7 +19,7 @@ from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
-from wholebody.terms.entries import Entry
+from wholebody.terms.entries import AXIS, RESIDUAL, Entry, Integers
 
 LOOSE = 1e-2  # a share of lengths, and rad
 NEARBY = 1e-3  # m, rad
@@ -48,7 +48,7 @@ class PlainChain:
         subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
         placements = [model.jointPlacements[joint] for joint in joints]
         self._number = number
-        self._integers: dict[tuple[tuple[int, ...], ...], NDArray[np.int64]] = {}
+        self._integers: dict[tuple[tuple[int, ...], ...], tuple[Integers, Integers]] = {}
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
         self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
         first, last = int(self._idx_q[0]), int(self._idx_q[-1]) + 1
@@ -93,16 +93,21 @@ class PlainChain:
 
     def goals(self, entries: list[Entry]) -> Goals:
         """Entries of goals with the numbers of these joints."""
-        kinds = tuple([entry.integers for entry in entries])
-        integers = self._integers.get(kinds)
-        if integers is None:
-            integers, row = np.empty((len(entries), 6), dtype=np.int64), 0
-            for k, entry in enumerate(entries):
-                joint, base, *kind = entry.integers
-                integers[k] = row, self._number[joint], self._number[base], *kind
+        kinds = tuple([(entry.table, *entry.integers) for entry in entries])
+        known = self._integers.get(kinds)
+        if known is None:
+            placed, pointed, row = list[tuple[int, ...]](), list[tuple[int, ...]](), 0
+            for entry in entries:
+                joint, second, *kind = entry.integers
+                if entry.table == RESIDUAL:
+                    placed.append((row, self._number[joint], self._number[second], *kind))
+                else:
+                    pointed.append((row, self._number[joint], second))
                 row += entry.rows
-            self._integers[kinds] = integers
-        return Goals(np.array([entry.floats for entry in entries]), integers)
+            known = np.array(placed, dtype=np.int64).reshape(-1, 6), np.array(pointed, dtype=np.int64).reshape(-1, 3)
+            self._integers[kinds] = known
+        places, axes = ([entry.floats for entry in entries if entry.table == table] for table in (RESIDUAL, AXIS))
+        return Goals(np.array(places).reshape(-1, 36), known[0], np.array(axes).reshape(-1, 24), known[1])
 
     def room(self, rows: int) -> Room:
         """Room for descents with so many rows: the same for the same number."""
@@ -170,7 +175,8 @@ class PlainChain:
 
     def is_guided(self, goals: Goals) -> bool:
         """Whether the goals are one placement of a frame that the guide has postures of."""
-        return self.guide is not None and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
+        alone = self.guide is not None and not len(goals.axis_entries)
+        return alone and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
 
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
@@ -182,7 +188,7 @@ class PlainChain:
         if self.first and not seeds:
             ends[:, 0], counts[:] = np.clip(nearest[:, 0], self.chain.lower, self.chain.upper), self.first
         compiled_kernel().reach_all(
-            (self.chain, arm, room), asked, (tables, goals.entries), self.samples, nearest, ends, found, counts
+            (self.chain, arm, room), asked, (tables, goals), self.samples, nearest, ends, found, counts
         )
         return found, counts
 
@@ -219,13 +225,13 @@ class Chains:
 
     def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
         """The chain that carries the frames of goals."""
-        return self.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
+        return self.of(frozenset(joint for entry in entries for joint in _joints_of(entry)))
 
     def apart(self, entries: Sequence[Entry]) -> list[tuple[PlainChain, list[Entry]]]:
         """The chains that carry the frames of goals and have no joint in common, each with its entries."""
         groups = list[tuple[set[int], list[Entry]]]()
         for entry in entries:
-            joints = {above for joint in entry.integers[:2] for above in self._model.supports[joint]} - {0}
+            joints = {above for joint in _joints_of(entry) for above in self._model.supports[joint]} - {0}
             own, others = [entry], list[tuple[set[int], list[Entry]]]()
             for known, theirs in groups:
                 if known & joints:
@@ -237,9 +243,14 @@ class Chains:
         return [(chain, own) for chain, own in found if chain is not None]
 
 
+def _joints_of(entry: Entry) -> tuple[int, ...]:
+    """The joints of a frame, and of the frame that its goal is relative to."""
+    return entry.integers[: 2 if entry.table == RESIDUAL else 1]
+
+
 def rows_of(goals: Goals) -> int:
     """How many rows the goals have."""
-    return _rows(goals.entries.tobytes())
+    return _rows(goals.entries.tobytes()) + 2 * len(goals.axis_entries)
 
 
 @lru_cache(maxsize=256)
@@ -272,12 +283,12 @@ def compiled_kernel(_: Any) -> None:
     )
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
     bodies, entries, near = (chain, _NO_ARM, room), np.zeros((0, 6), dtype=np.int64), np.zeros((0, 2, 1))
+    goals, efforts = Goals(np.zeros((1, 36)), entries, np.zeros((0, 24)), entries[:, :3].copy()), np.empty((0, 2))
     chain_kernel.reach_all(
-        bodies, np.zeros(5), (np.zeros((0, 0, 36)), entries), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
+        bodies, np.zeros(5), (np.zeros((0, 0, 36)), goals), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
         np.zeros(0, dtype=np.intp),
     )  # fmt: skip
     one_arm = with_values(_NO_ARM, axes=axis, points=axis, joints=joint, held=0)
-    goals, efforts = Goals(np.zeros((1, 36)), entries), np.empty((0, 2))
     branch_kernel.downhill(np.zeros((2, BRANCHES)), np.zeros((2, BRANCHES)), 0.0, joint, efforts)
     branch_kernel.along(
         (chain, one_arm, room, True), np.zeros(5), goals, np.zeros((2, 1)), (0.0, 0.0, 0), axis[:0, :1].copy(),
