@@ -77,8 +77,8 @@ def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
     """By central differences of the errors that the goals themselves compute, one goal relative to the other arm."""
     rng = np.random.default_rng(5)
     start = rng.uniform(-1.0, 1.0, 7)
-    goals = [random_goal(two_arms, "left", rng, True), wb.Axis("left", (1, 2, 3), direction=(0, 1, 1)),
-             wb.Axis("right", (1, 0, 0), toward=(0.1, 0.2, 0.9)), wb.Relative("right", "left", (0.1, 0.2, 0.3))]  # fmt: skip
+    axes = [wb.Axis("left", (1, 2, 3), direction=(0, 1, 1)), wb.Axis("right", (1, 0, 0), toward=(0.1, 0.2, 0.9))]
+    goals = [random_goal(two_arms, "left", rng, True), *axes, wb.Relative("right", "left", (0.1, 0.2, 0.3))]
     problem = wb.Problem(wb.Scene(two_arms), start, goals=goals)
     chain, kernel = whole_chain(two_arms.model, two_arms.limits), chain_kernel
     entries = chain.goals(goal_entries(problem))
@@ -165,6 +165,19 @@ def test_an_end_inside_of_something_is_rejected(arm):
     assert solution.assessment.measure <= wb.assess(problem, measured.q).measure + 1e-6
 
 
+def test_an_end_that_an_inequality_forbids_is_rejected(arm):
+    """A link is below a plane at the end of least effort, and above it at the answer."""
+    goal = wb.Point("tip", place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation)
+    free = wb.solve(wb.Problem(wb.Scene(arm), START, goals=[goal]))
+    height = place_of(arm, free.q, "pitch_link").translation[2] + 0.02
+    above = wb.Plane("pitch_link", (0, 0, 1), point=(0.0, 0.0, height), side="above")
+    problem = wb.Problem(wb.Scene(arm), START, goals=[goal], constraints=[above])
+    assert place_of(arm, found(problem).q, "pitch_link").translation[2] >= height - 1e-6
+    solution = wb.methods.QP().solve(problem)
+    assert solution.solved, solution.message
+    assert solution.assessment.measure >= free.assessment.measure
+
+
 def test_where_all_ends_of_least_effort_are_blocked_one_of_more_effort_is_found():
     """Of what reaches into a shelf, ends of least effort come from below, through a board."""
     rng, reached = np.random.default_rng(3), 0
@@ -223,8 +236,13 @@ def test_what_it_does_not_know_it_does_not_take(arm):
         "no goals": (False, wb.Problem(scene, START)),
         "a hold": (True, wb.Problem(scene, START, goals=[point], constraints=[wb.Hold("tip", orientation=False)])),
         "an axis": (True, wb.Problem(scene, START, goals=[point, wb.Axis("tip", (0, 0, 1), toward=(1.0, 0.0, 0.0))])),
-        "a frozen joint": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Freeze("base")])),
+        "a frozen joint": (True, wb.Problem(scene, START, goals=[point], constraints=[wb.Freeze("base")])),
         "a plane": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Plane("tip", normal=(0, 0, 1))])),
+        "a side of it": (
+            True,
+            wb.Problem(scene, START, goals=[point], constraints=[wb.Plane("tip", normal=(0, 0, 1), side="above")]),
+        ),
+        "bounded steps": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.tasks.StepLimit(1.0)])),
         "a goal of one's own": (False, wb.Problem(scene, START, goals=[Own("tip", (0.4, 0.2, 0.6))])),
     }
     for what, (known, problem) in stated.items():
@@ -234,14 +252,25 @@ def test_what_it_does_not_know_it_does_not_take(arm):
     assert found(free_root) is None
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, turned):
+@pytest.mark.parametrize("kind", ["point", "placement", "point and axis", "axis towards a place", "frozen"])
+def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, kind):
     """The posture is stationary too; more starts for the measure find the best of all."""
     rng, state = np.random.default_rng(23), State(arm.model)
-    lower, upper = arm.model.lowerPositionLimit, arm.model.upperPositionLimit
+    lower, upper = arm.model.lowerPositionLimit.copy(), arm.model.upperPositionLimit.copy()
     for _ in range(1):
-        problem = wb.Problem(wb.Scene(arm), START, goals=[random_goal(arm, "tip", rng, turned)])
-        weights, errors = problem.measures[0].distance.weights, problem.goals[0].error
+        goals, still = [random_goal(arm, "tip", rng, kind == "placement")], []
+        if "axis" in kind:
+            way = {"direction": (1.0, 2.0, -1.0)} if kind == "point and axis" else {"toward": (0.1, 0.2, 1.5)}
+            goals.append(wb.Axis("tip", (0, 0, 1), **way))
+        elif kind == "frozen":
+            lower[3] = upper[3] = START[3]
+            still.append(wb.Freeze("roll"))
+        problem = wb.Problem(wb.Scene(arm), START, goals=goals, constraints=still)
+        weights = problem.measures[0].distance.weights
+
+        def errors(at, goals=problem.goals):
+            return np.concatenate([goal.error(at) for goal in goals])
+
         least = np.inf
         for start in [START, *rng.uniform(lower, upper, (8, len(lower)))]:
             answer = minimize(

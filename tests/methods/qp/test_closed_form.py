@@ -32,6 +32,12 @@ ARMS = {
 }
 
 
+def placed(table: np.ndarray) -> Goals:
+    """One placement with such floats (36,)."""
+    integers = np.zeros((1, 6), dtype=np.int64)
+    return Goals(table[None], integers, np.zeros((0, 24)), integers[:0, :3])
+
+
 def arm(name: str, rng: np.random.Generator, most: float = 2.0 * np.pi) -> tuple[pin.Model, PlainChain]:
     """An arm, in a base that is turned and moved."""
     model, parent = pin.Model(), 0
@@ -54,7 +60,7 @@ def branches(figure: wb.Figure, frame: str, placement: pin.SE3, at: np.ndarray) 
     if chain is None or chain.arm is None:
         return np.zeros((0, model.nq))
     floats = [placement_floats(known.placement), np.zeros(12), placement.translation, placement.rotation.ravel()]
-    goals = Goals(np.concatenate(floats)[None], np.zeros((1, 6), np.int64), np.zeros((0, 24)), np.zeros((0, 3), np.int64))
+    goals = placed(np.concatenate(floats))
     near = chain.angles(at)
     found = chain.branches(goals, np.array([near, np.zeros_like(near)]))
     order = found.effort.argsort()[: np.count_nonzero(found.effort < np.inf)]
@@ -211,7 +217,7 @@ def test_joints_without_limits_are_not_out_of_reach(name):
     q, data = rng.uniform(-np.pi, np.pi, 6), model.createData()
     pin.forwardKinematics(model, data, q)
     table = goal_of(chain, data.oMi[6], pin.SE3.Identity())
-    found = chain.loosely_met(Goals(table[None], np.zeros((1, 6), np.int64), np.zeros((0, 24)), np.zeros((0, 3), np.int64)), 0)
+    found = chain.loosely_met(placed(table), 0)
     assert np.abs(np.exp(1j * found) - np.exp(1j * q)).max(axis=1).min() < 1e-6
 
 

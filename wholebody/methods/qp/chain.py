@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import tasks
-from wholebody.base.arrays import Array, with_values
+from wholebody.base.arrays import Array, Mask, with_values
 from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
 from wholebody.methods.qp.along_branches import Along
@@ -23,6 +23,7 @@ from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
+from wholebody.tasks.base import Constraint
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
 
@@ -57,11 +58,11 @@ def chains_of(problem: Problem) -> Pool[Chains]:
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
-    """Entries of goals and holds, if places, rotations and axes are all that must hold; None otherwise."""
-    if problem.bounds or not problem.goals or not all(type(one) is tasks.Hold for one in problem.constraints):
+    """Entries of goals and equalities, if these are places, rotations and axes; None otherwise."""
+    if not problem.goals or any(type(one) is not tasks.Freeze for one in problem.bounds):
         return None
     found: list[Entry] = []
-    for term in (*problem.goals, *problem.constraints):
+    for term in (*problem.goals, *(one for one in problem.constraints if np.any(one.lower == one.upper))):
         entries = entries_of(term, problem.scene.model)
         if entries is None or any(entry.table not in (RESIDUAL, AXIS) for entry in entries):
             return None
@@ -78,10 +79,19 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         chain = chains.carrying(entries)
         if chain is None:
             return None
+        chain = chain.still(problem.scene.figure.clamp(problem.start), frozen(problem, workspace))
         distance = distance_of(problem, chain) if settings.measures else None
         asked = Asked.by(problem, chain, entries, distance)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
         return Descents(asked, chain, rule, workspace, settings, control).run()
+
+
+def frozen(problem: Problem, workspace: Workspace) -> Mask:
+    """Which degrees of freedom (nv,) stay as they are at the start."""
+    still = np.zeros(problem.scene.model.nv, dtype=bool)
+    for one in problem.bounds:
+        still |= one.bounds(workspace.state, None)[1] == 0.0
+    return still
 
 
 class Asked(NamedTuple):
@@ -91,6 +101,7 @@ class Asked(NamedTuple):
     at: Array  # (nq,) its start, within limits
     nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
     clearances: Array  # (pairs,) metres
+    bounded: tuple[Constraint, ...] = ()  # inequalities, which reject ends
 
     @classmethod
     def by(cls, problem: Problem, chain: PlainChain, entries: list[Entry], distance: SquaredDistance | None) -> Asked:
@@ -100,7 +111,8 @@ class Asked(NamedTuple):
         nearest[0] = chain.angles(at if distance is None else distance.reference)
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
-        return cls(chain.goals(entries), at, nearest, problem.clearances)
+        bounded = tuple(one for one in problem.constraints if not np.any(one.lower == one.upper))
+        return cls(chain.goals(entries), at, nearest, problem.clearances, bounded)
 
 
 def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
@@ -112,7 +124,7 @@ def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
     entries, none = goal_entries(problem), np.zeros((0, problem.scene.model.nq))
     with chains_of(problem).borrow() as chains:
         whole = None if entries is None else chains.carrying(entries)
-        if entries is None or whole is None or len(whole.idx_v) < problem.scene.model.nv:
+        if entries is None or whole is None or problem.bounds or len(whole.idx_v) < problem.scene.model.nv:
             return none, False
         distance = distance_of(problem, whole)
         found, effort, every = problem.scene.figure.clamp(problem.start)[None], np.zeros(1), True
@@ -200,7 +212,9 @@ class Descents:
 
     def _along_branches(self, branches: Branches, most: float) -> Array | None:
         """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
-        goals, at, nearest, clearances = self.asked
+        goals, at, nearest, clearances, bounded = self.asked
+        if bounded:
+            return None  # intervals of branches end where things are in the way, and not where inequalities do
         asked = how_far(self.settings, 1, others=True)
         along = Along(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
         found = along.least(branches, most)
@@ -211,7 +225,7 @@ class Descents:
 
     def _is_out_of_reach(self) -> bool:
         """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
-        chain, (goals, at, _, clearances) = self.chain, self.asked
+        chain, (goals, at, _, clearances, _) = self.chain, self.asked
         if self.settings.tolerance > NEARBY:
             return False  # postures farther from the goal would do
         found = chain.loosely_met(goals, self.settings.seed)
@@ -239,13 +253,13 @@ class Descents:
 
     def _descended(self, seeds: Array, asked: Array) -> tuple[Array, int]:
         """What is found (k, 4) from seeds (k, n), which become ends, and how many were taken."""
-        goals, _, nearest, _ = self.asked
+        goals, _, nearest, *_ = self.asked
         found, counts = self.chain.descents(goals.tables[None], goals, nearest[None], asked, seeds[None], len(seeds))
         return found[0, : counts[0]], int(counts[0])
 
     def _first_ended(self) -> tuple[Array, Array]:
         """Ends (k, n) of the closed form's branches, and what was found there (k, 4); empty for more than `FIRST`."""
-        goals, _, nearest, _ = self.asked
+        goals, _, nearest, *_ = self.asked
         ends, asked = np.empty((1, FIRST, len(self.start))), how_far(self.settings, self.rule.enough)
         found, counts = self.chain.descents(goals.tables[None], goals, nearest[None], asked, ends)
         count = max(int(counts[0]), 0)
@@ -284,7 +298,11 @@ class Descents:
         return float(self.asked.nearest[1].dot(away * away))
 
     def _is_free(self, q: Array) -> bool:
-        return is_free(self.workspace, q, self.asked.clearances, self.within)
+        if not is_free(self.workspace, q, self.asked.clearances, self.within):
+            return False
+        state, slack = self.workspace.state.update(q), self.settings.tolerance
+        values = ((one, one.value(state)) for one in self.asked.bounded)
+        return all(np.all((one.lower - slack <= at) & (at <= one.upper + slack)) for one, at in values)
 
 
 def how_far(settings: Settings, enough: int, others: bool = False) -> Array:

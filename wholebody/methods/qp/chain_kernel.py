@@ -332,8 +332,8 @@ def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
         columns[k, 1] = joints[c, 3, 2] * x - joints[c, 3, 0] * z
         columns[k, 2] = joints[c, 3, 0] * y - joints[c, 3, 1] * x
     residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
-    for e in range(len(goals.axis_entries)):
-        room.wrench[goals.axis_entries[e, 0] : goals.axis_entries[e, 0] + 2] = 0.0  # of a direction no force is written
+    for row in goals.axis_entries[:, 0]:
+        room.wrench[row : row + 2] = 0.0  # of a direction no force is written
     axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)
 
 
@@ -349,8 +349,7 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
     for e in range(len(axes)):
         for r in range(axes[e, 0], axes[e, 0] + 2):
             for k in range(len(room.columns)):
-                moves = support[axes[e, 1], k] != 0
-                room.jacobian[r, k] = dot(room.wrench[r], room.columns[k]) if moves else 0.0
+                room.jacobian[r, k] = dot(room.wrench[r], room.columns[k]) if support[axes[e, 1], k] != 0 else 0.0
 
 
 @compiled(error_model="numpy", nogil=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from functools import lru_cache
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices, with_values
+from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import branch_kernel, chain_kernel
@@ -74,6 +75,17 @@ class PlainChain:
         self.held = -1 if self.guide is None or self.guide.held < 0 else int(self.guide.joints[self.guide.held])
         self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
         self.first = int(self.held >= 0 or (self.arm is None and self.guide is not None))
+
+    def still(self, q: Array, frozen: Mask) -> PlainChain:
+        """The chain whose joints among `frozen` (nv,) stay as at a posture (nq,), then without a closed form."""
+        held = frozen[self.idx_v]
+        if not held.any():
+            return self
+        made, values, own = copy(self), self.angles(q), self.chain
+        lower, upper = (np.where(held, values, limit) for limit in (own.lower, own.upper))
+        made.chain, made.arm, made.guide = with_values(own, lower=lower, upper=upper), None, None
+        made.held, made.samples, made.first = -1, (1, 1), 0
+        return made
 
     def angles(self, q: Array) -> Array:
         """Values (..., n) of the joints at postures (..., nq); may be a view of these."""
