@@ -192,7 +192,10 @@ class _Search(Multistart[_Trial]):
             yield Attempt(starts, lambda q: self._attempt(q, free, "restart"), "")
 
     def _closed(self, best: _Trial) -> _Trial:
-        """A trial that misses the goals, or an intermediate posture, where loops are closed and nothing overlaps, or hardly."""
+        """A trial that misses the goals, or a posture between, where loops are closed and nothing overlaps.
+
+        Without one, as time may end, the trial or the start, whose loops are less open.
+        """
         if not self._request.loops or self.solves(best):
             return best
         self._reach.begin(replace(self._request, goals=self._request.loops), Control(np.inf))
