@@ -23,9 +23,11 @@ from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
-from wholebody.tasks import Relative
+from wholebody.tasks import Hold, Relative
+from wholebody.tasks.bounds import shortened
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget, warm_started
+from wholebody.tracking.qp_strategy import largest_motions
 
 Answer = TypeVar("Answer", Solution, AssemblySolution)
 
@@ -99,6 +101,10 @@ class ProblemDrag:
         moving_goal(problem, goal)
         self._number, self._seconds, self._moves = goal, budget, GoalMoves(budget)
         self._motion: FrameMotion | None = None
+        most = largest_motions(problem.scene, 8.0 * self.dt, 3.0 * self.dt)  # rad/s, m/s: as a tracked figure's
+        closed = any(isinstance(term, Hold) and term.relative_to for term in problem.constraints)
+        # a frame within a budget is seen as it comes; part of a motion would open what two frames hold together
+        self._fastest = None if budget == np.inf or closed else np.array((-most, most))
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def place(self, q: Array) -> None:
@@ -144,6 +150,7 @@ class ProblemDrag:
         deep = deep if deep > GRAZE else 0.0
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
+            q = shortened(self.problem.scene.model, self.q, q, self._fastest)
             if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self.workspace, q) <= GRAZE):
                 self.q = q
                 break
@@ -258,7 +265,8 @@ class Drag(NotCopyable, Generic[Answer]):
     `over`) "qp" evades them as they come; the others meet them where they end. What they could not avoid is
     named in the answer. A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
 
-    With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
+    With a budget a frame ends with what it has found by then, and the next goes on from there; joints turn by at most
+    8 rad/s, where no `Hold` is relative to another frame, as other methods than "qp" may jump. Where it was not enough
     to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
 
     Raises:
