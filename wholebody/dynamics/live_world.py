@@ -136,8 +136,9 @@ class LiveWorld:
         frame = self.world.step(self._track())
         self._note = frame.note
         error = 0.0 if target is None else float(np.linalg.norm(self.place(self.taken) - target))
+        contacts = self.scene.contacts(frame.q, within=0.002)  # m: pairs nearer than this are counted, as in a drag
         seconds = time.perf_counter() - began
-        return LiveFrame(frame.q, error, len(frame.collisions), frame.deepest, seconds, self._status())
+        return LiveFrame(frame.q, error, len(contacts.distance), frame.deepest, seconds, self._status())
 
     def toggle(self, name: str) -> bool:
         """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
@@ -176,7 +177,8 @@ class LiveWorld:
         )
         lost = ", ".join(name for name in list(self._renewed) if self._lost(name))
         notes = [self._note, f"no place of {lost} arrives any more; it eases back" if lost else ""]
-        return ": ".join((doing, "; ".join(filter(None, notes)))) if any(notes) else doing
+        said = "; ".join(filter(None, notes))
+        return f"{doing}: {said}" if said and self.taken else said or doing
 
     def _lost(self, name: str) -> bool:
         """Whether a tracker has not given the place of a handle for so long that it goes back."""
