@@ -177,3 +177,44 @@ def test_every_handle_is_in_the_picture_and_none_hides_the_next(figure: str, tmp
                     assert sizes[one] + sizes[other] < 0.6 * np.linalg.norm(live.place(one) - live.place(other))
     finally:
         page.stop()
+
+
+def test_a_joint_that_is_ticked_closes_and_one_that_cannot_is_told(tmp_path: Path) -> None:
+    y, held = (0.0, 1.0, 0.0), "revolute joint of 'rod' and 'ball'"
+    made = wb.Assembly().body("rod", shape=wb.Capsule(0.02, 0.3)).body("ball", (0, 0, 1.0), shape=wb.Sphere(0.05))
+    made.revolute("world", "rod", at=(0, 0, 0), axis=y).revolute("rod", "ball", at=(0, 0, 0.9), axis=y)
+    drag = LiveDrag(made)
+    page = opened(drag, tmp_path)
+
+    def ticked(name: str, holds: bool) -> float:
+        """The distance (3,) between the two places of the joint after all frames."""
+        page._constraints[name].value = holds
+        page._constrained(drag, name, None)
+        while page._target is not None:
+            page.follow(page._target)
+        rod, ball = (drag._placement(drag.q, body) for body in ("rod", "ball"))
+        return float(np.linalg.norm(rod.act(np.array((0, 0, 0.9))) - ball.act(np.array((0, 0, -0.1)))))
+
+    try:
+        page._stopped.set()  # frames are made here
+        page._loop.join()
+        assert ticked(held, False) == pytest.approx(0.0, abs=1e-6)
+        drag.take("ball")
+        for share in np.linspace(0.0, 1.0, 30):
+            drag.move(np.array((0.5 * share, 0.0, 1.0)))
+        drag.let_go()
+        assert ticked(held, True) == pytest.approx(0.0, abs=1e-4)
+        assert "do not close" not in drag.report().status
+        ticked(held, False)
+        drag.take("ball")
+        for share in np.linspace(0.0, 1.0, 60):
+            drag.move(np.array((0.5 + 2.0 * share, 0.0, 1.0)))
+        drag.let_go()
+        drag.toggle("ball")
+        left = ticked(held, True)
+        assert left > 1.0
+        assert "joints do not close, by " in drag.report().status
+        assert drag.undo()
+        assert "do not close" not in drag.report().status
+    finally:
+        page.stop()

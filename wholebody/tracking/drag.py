@@ -44,6 +44,7 @@ class DragFrame(NamedTuple):
     # shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight from
     # one to the next nothing was passed but the collisions.
     path: tuple[tuple[float, Array], ...] = ()
+    open: float = 0.0  # largest error of an assembly's joints and contacts, metres or radians
 
     def __repr__(self) -> str:
         hit = f", {len(self.collisions)} collisions" if self.collisions else ""
@@ -228,7 +229,7 @@ class AssemblyDrag:
         """Make one frame towards a position, placement or orientation; raises InputError where the target is none."""
         began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
         path: tuple[tuple[float, Array], ...] = ()
-        made, goal = self.problem, self._goal
+        made, goal, hard = self.problem, self._goal, 0.0
         made.retarget(goal, target)
         error, before = made.goal_error(goal), made.variables()
         with within_budget(self._moves.budget):
@@ -238,7 +239,7 @@ class AssemblyDrag:
                         made.interpolate_goal(goal, share, target)
                     step = made.step()
                     spent, collisions = spent + step.iterations, collisions or step.collisions
-                    path = step.path or path
+                    path, hard = step.path or path, step.joint_error
                     if step.taken:
                         break
             finally:
@@ -248,7 +249,7 @@ class AssemblyDrag:
         left = max(made.goal_error(number) for number in range(len(made.goals)))
         if path and not np.array_equal(path[-1][1], made.q):
             path = (*path, (1.0, made.q))
-        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions, path)
+        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions, path, hard)
 
     def finish(self) -> AssemblySolution:
         """Meet the present goals with full accuracy."""

@@ -283,6 +283,8 @@ class LivePage:
         with self._lock:
             if self._constraints[name].value != drag.constraints[name]:
                 drag.constrain(name, self._constraints[name].value)
+                if self._target is None:  # frames close what is to hold now
+                    self._target, self._settling = drag.place(drag.taken), SETTLING
 
     def _share(self, world: LiveWorld) -> None:
         world.give_way = self._give_way.value
