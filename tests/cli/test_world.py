@@ -8,7 +8,8 @@ import pytest
 
 from tests.csv_rows import csv_rows
 from wholebody.cli import main
-from wholebody.dynamics.world import WORLD_SCENES
+from wholebody.dynamics.world import WORLD_SCENES, build_world_scene
+from wholebody.taskfile.task import View
 
 TASK = """\
 [figure]
@@ -60,6 +61,30 @@ def test_a_body_of_a_task_file_has_a_mass_or_a_density(tmp_path: Path, capsys: p
     task.write_text(TASK.format(body="mass = 2.0\ndensity = 300.0"))
     assert main(["world", str(task), "--out", str(out)]) == 2
     assert "give one of them" in capsys.readouterr().err
+
+
+def test_a_live_page_has_the_camera_of_the_scene_or_the_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    views = []
+
+    class Page:
+        def __init__(self, *_: object, view: View, **__: object) -> None:
+            views.append(view)
+            self.url = ""
+
+        def serve(self) -> None: ...
+
+    monkeypatch.setattr("wholebody.cli.world.LivePage", Page)
+    task = tmp_path / "ball.toml"
+    seen = "[view]\neye = [2.0, 1.0, 1.0]\ntarget = [0.5, 0.0, 0.0]\nsee_through = ['ball']\n"
+    task.write_text(seen + TASK.format(body="mass = 2.0"))
+    assert main(["world", str(task), "--live"]) == 0
+    assert main(["world", "flick", "--live"]) == 0
+    scene = build_world_scene("flick")
+    assert views == [
+        View((2.0, 1.0, 1.0), (0.5, 0.0, 0.0), ("ball",)),
+        View(scene.eye, scene.target, scene.see_through),
+    ]
+    assert scene.eye is not None
 
 
 DOOR = """

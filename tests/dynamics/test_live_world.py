@@ -82,6 +82,26 @@ def test_a_lost_tracker_holds_then_eases_back_and_a_jump_is_followed_at_a_bounde
         live.follow({"left_palm": [np.nan, 0.0, 0.0]})
 
 
+def test_what_a_lost_tracker_left_is_free_again_when_it_is_back_and_a_sole_is_held_again(live: LiveWorld) -> None:
+    home = {name: live.place(name) for name in ("left_palm", "left_sole")}
+    for _ in range(30):
+        live.follow({name: place + [0.05, 0.05, 0.15] for name, place in home.items()})
+        live.move()
+    said = [live.move().status for _ in range(300)]
+    assert any("no place of left_palm, left_sole arrives any more" in status for status in said)
+    assert "arrives" not in said[-1]
+    for name, place in home.items():
+        assert live.place(name) == pytest.approx(place, abs=3e-3)
+    frame, turn = live.scene.figure.frame_id("left_sole"), live.scene.state(live.q).frame
+    before, hand = turn(frame).rotation.copy(), live.place("left_palm")
+    live.take("pelvis")
+    for share in np.linspace(0.0, 1.0, 40):
+        live.move(live.place("pelvis") * (1.0 - share) + share * (live.place("pelvis") + [0.0, 0.01, -0.01]))
+    after = live.scene.state(live.q).frame(frame).rotation
+    np.testing.assert_allclose(after, before, atol=2e-3)  # of the hold; a place alone leaves turns free
+    assert np.linalg.norm(live.place("left_palm") - hand) > 0.02  # it goes with the body
+
+
 def test_a_tracker_that_comes_back_from_far_away_is_followed_at_once() -> None:
     live = LiveWorld(wb.Scene(wb.load("avatar")))
     began = live.place("left_palm")

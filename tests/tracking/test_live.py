@@ -250,6 +250,19 @@ def test_what_is_dragged_moves_on_a_machine_that_is_slow(root: Path, monkeypatch
     np.testing.assert_allclose(drag.place("arm/grip"), before + (0.0, 0.02, 0.0), atol=2e-3)
 
 
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd"])
+def test_no_joint_jumps_where_the_mouse_goes_out_of_reach(drag: LiveDrag, method: str) -> None:
+    """The nearest postures to two targets beside each other may be far apart, as those of an arm that is stretched."""
+    drag.choose(method)
+    begin = drag.place("right_palm")
+    drag.take("right_palm")
+    for turn in np.linspace(0.0, 2.0 * np.pi, 90):
+        before = drag.q
+        frame = drag.move(begin + (0.2 * np.sin(turn), -0.15 * (1.0 - np.cos(turn)), 0.2 * np.sin(2.0 * turn)))
+        assert np.abs(pin.difference(drag.scene.model, before, frame.q)[6:]).max() < 8.5 / 60.0  # rad
+    assert frame.overlap < 1e-4
+
+
 @pytest.mark.parametrize("given", [wb.Assembly(), wb.Assembly().body("block", (0, 0, 0))], ids=["empty", "no shapes"])
 def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged(given: wb.Assembly) -> None:
     if not given.bodies:

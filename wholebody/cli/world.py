@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from wholebody.base.arrays import Array
@@ -19,6 +20,7 @@ from wholebody.cli.tables import bar, print_rows
 from wholebody.dynamics.live_world import LiveWorld
 from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_world_scene, standing_scene
 from wholebody.taskfile import read_task
+from wholebody.taskfile.task import View
 from wholebody.tracking.loop import OVERLAPS
 from wholebody.tracking.overlaps import GIVE_WAY, Overlap, overlaps
 from wholebody.tracking.receiver import Receiver
@@ -67,7 +69,9 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
             print(f"refused: {receiver.note}", flush=True)
         return found
 
-    page = LivePage(live, arguments.out, arguments.port or 8080, places=None if receiver is None else places)
+    view = View(scene.eye, scene.target, scene.see_through)
+    asked = None if receiver is None else places
+    page = LivePage(live, arguments.out, arguments.port or 8080, places=asked, view=view)
     print(f"drag handles and things at {page.url}; Ctrl-C ends", flush=True)
     page.serve()
     if receiver is not None:
@@ -78,9 +82,10 @@ def _live(scene: InteractionScene, arguments: argparse.Namespace) -> int:
 def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
     """The scene of a name, or that of a task file, whose figure stands as the file starts."""
     if name.endswith(".toml"):
-        problem = read_task(name).problem
+        task = read_task(name)
         # frames of a task file
-        return standing_scene(title_of(name), problem.scene, problem.start, frames=arguments.frames or 180)
+        scene = standing_scene(title_of(name), task.problem.scene, task.problem.start, frames=arguments.frames or 180)
+        return replace(scene, eye=task.view.eye, target=task.view.target, see_through=task.view.see_through)
     return build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
 
 

@@ -23,7 +23,7 @@ from wholebody.dynamics.world import World
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks import Hold, Point
+from wholebody.tasks import Frame, Hold, Point
 from wholebody.tracking.live import LiveFrame
 from wholebody.tracking.live_subjects import LiveProblem, handle_frames, things_of
 from wholebody.tracking.overlaps import GIVE_WAY
@@ -87,6 +87,7 @@ class LiveWorld:
         self._tracked, self._goals, self._renewed = np.array(self.world.q), dict[str, Array](), dict[str, float]()
         self._tracker: Any = None
         self._places = {name: self.place(name) for name in self.handles}
+        self._turns = dict[str, Array]()
         self._note = ""
 
     @property
@@ -112,7 +113,7 @@ class LiveWorld:
     def follow(self, places: Mapping[str, ArrayLike]) -> None:
         """Handles are to follow places (3,) [m] from outside, such as a tracked head and hands, from the next frame on.
 
-        One that is not renewed within 0.25 s stays, and after it eases back to where it began.
+        One that is not renewed within 0.25 s stays, and after it eases back to where it began. There it is let go.
 
         Raises:
             InputError: a place is not three finite numbers.
@@ -135,8 +136,9 @@ class LiveWorld:
         frame = self.world.step(self._track())
         self._note = frame.note
         error = 0.0 if target is None else float(np.linalg.norm(self.place(self.taken) - target))
+        contacts = self.scene.contacts(frame.q, within=0.002)  # m: pairs nearer than this are counted, as in a drag
         seconds = time.perf_counter() - began
-        return LiveFrame(frame.q, error, len(frame.collisions), frame.deepest, seconds, self._status())
+        return LiveFrame(frame.q, error, len(contacts.distance), frame.deepest, seconds, self._status())
 
     def toggle(self, name: str) -> bool:
         """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
@@ -144,8 +146,7 @@ class LiveWorld:
         self.held ^= {name}
         self._tracker = None
         if name not in self.held:
-            self._goals.pop(name, None)
-            self._renewed.pop(name, None)
+            self._release(name)
         return name in self.held
 
     def choose(self, method: object) -> None:
@@ -176,7 +177,8 @@ class LiveWorld:
         )
         lost = ", ".join(name for name in list(self._renewed) if self._lost(name))
         notes = [self._note, f"no place of {lost} arrives any more; it eases back" if lost else ""]
-        return ": ".join((doing, "; ".join(filter(None, notes)))) if any(notes) else doing
+        said = "; ".join(filter(None, notes))
+        return f"{doing}: {said}" if said and self.taken else said or doing
 
     def _lost(self, name: str) -> bool:
         """Whether a tracker has not given the place of a handle for so long that it goes back."""
@@ -184,15 +186,18 @@ class LiveWorld:
         return self.world.time - self._renewed.get(name, np.inf) > 0.25  # s
 
     def _handle_place(self, q: Array, name: str) -> Array:
+        return np.array(self._handle_placement(q, name).translation)
+
+    def _handle_placement(self, q: Array, name: str) -> pin.SE3:
         handle = self._subject.handles[name]
-        return np.array(self._state.update(q).data.oMi[handle.joint].act(handle.local.translation))
+        return self._state.update(q).data.oMi[handle.joint] * handle.local
 
     # ---- a frame
 
     def _goal(self, name: str, place: Array, clamped: bool = False) -> None:
         """Follow a place with a handle; a place from outside that jumps is followed at a bounded speed."""
         if name not in self._goals:
-            self._tracker = None
+            self._tracker, self._turns[name] = None, np.array(self._handle_placement(self._tracked, name).rotation)
         if clamped:  # from where the handle is: a goal that ran far out of reach would be long on its way back
             here = self._handle_place(self._tracked, name)
             length = float(np.linalg.norm(place - here))
@@ -221,11 +226,21 @@ class LiveWorld:
         engine.push(name, dt * (mass * drawn - engine.weight(name)), engine.centre(name))
 
     def _ease(self) -> None:
-        """Bring handles back that a tracker has lost."""
-        for name in list(self._renewed):
-            if self._lost(name):
-                share = min(1.0, self.world.dt / 0.3)  # it eases back to where its handle began, in about a second
-                self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
+        """Bring handles back that a tracker has lost, and let them go when they are there."""
+        lost, away = [name for name in list(self._renewed) if self._lost(name)], 0.0
+        share = min(1.0, self.world.dt / 0.3)  # it eases back to where its handle began, in about a second
+        for name in lost:
+            self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
+            there = self._handle_place(self._tracked, name) - self._places[name]
+            away = max(away, float(np.linalg.norm(there)))
+        for name in lost if away < 1e-3 else ():  # m; all at once, or those that are still on their way pull at it
+            self._release(name)
+
+    def _release(self, name: str) -> None:
+        """Follow no place with a handle any more."""
+        self._goals.pop(name, None)
+        self._renewed.pop(name, None)
+        self._tracker = None
 
     def _track(self) -> Array:
         if not self._goals:
@@ -237,8 +252,12 @@ class LiveWorld:
         self._tracked = np.array(self._tracker.step(self._tracked).q)
         return self._tracked
 
-    def _points(self) -> list[Point]:
-        return [Point(name, place) for name, place in self._goals.items()]
+    def _points(self) -> list[Point | Frame]:
+        """The goals: places; frames that are held keep their turn, as a sole stays level."""
+        return [
+            Frame(name, pin.SE3(self._turns[name], place)) if name in self.held else Point(name, place)
+            for name, place in self._goals.items()
+        ]
 
     def _prepare(self) -> None:
         """Make a tracker of the present goals and holds: for two people it takes as long as a frame."""

@@ -23,9 +23,11 @@ from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
-from wholebody.tasks import Relative
+from wholebody.tasks import Hold, Relative
+from wholebody.tasks.bounds import shortened
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget, warm_started
+from wholebody.tracking.qp_strategy import largest_motions
 
 Answer = TypeVar("Answer", Solution, AssemblySolution)
 
@@ -42,6 +44,7 @@ class DragFrame(NamedTuple):
     # shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight from
     # one to the next nothing was passed but the collisions.
     path: tuple[tuple[float, Array], ...] = ()
+    open: float = 0.0  # largest error of an assembly's joints and contacts, metres or radians
 
     def __repr__(self) -> str:
         hit = f", {len(self.collisions)} collisions" if self.collisions else ""
@@ -99,6 +102,10 @@ class ProblemDrag:
         moving_goal(problem, goal)
         self._number, self._seconds, self._moves = goal, budget, GoalMoves(budget)
         self._motion: FrameMotion | None = None
+        most = largest_motions(problem.scene, 8.0 * self.dt, 3.0 * self.dt)  # rad/s, m/s: as a tracked figure's
+        closed = any(isinstance(term, Hold) and term.relative_to for term in problem.constraints)
+        # a frame within a budget is seen as it comes; part of a motion would open what two frames hold together
+        self._fastest = None if budget == np.inf or closed else np.array((-most, most))
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def place(self, q: Array) -> None:
@@ -144,6 +151,7 @@ class ProblemDrag:
         deep = deep if deep > GRAZE else 0.0
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
+            q = shortened(self.problem.scene.model, self.q, q, self._fastest)
             if self._is_free(q, self.tracker.unswept) and (not deep or self.workspace.deepest(q) <= GRAZE):
                 self.q = q
                 break
@@ -216,7 +224,7 @@ class AssemblyDrag:
         """Make one frame towards a position, placement or orientation; raises InputError where the target is none."""
         began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
         path: tuple[tuple[float, Array], ...] = ()
-        made, goal = self.problem, self._goal
+        made, goal, hard = self.problem, self._goal, 0.0
         made.retarget(goal, target)
         error, before = made.goal_error(goal), made.variables()
         with within_budget(self._moves.budget):
@@ -226,7 +234,7 @@ class AssemblyDrag:
                         made.interpolate_goal(goal, share, target)
                     step = made.step()
                     spent, collisions = spent + step.iterations, collisions or step.collisions
-                    path = step.path or path
+                    path, hard = step.path or path, step.joint_error
                     if step.taken:
                         break
             finally:
@@ -236,7 +244,7 @@ class AssemblyDrag:
         left = max(made.goal_error(number) for number in range(len(made.goals)))
         if path and not np.array_equal(path[-1][1], made.q):
             path = (*path, (1.0, made.q))
-        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions, path)
+        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions, path, hard)
 
     def finish(self) -> AssemblySolution:
         """Meet the present goals with full accuracy."""
@@ -253,7 +261,8 @@ class Drag(NotCopyable, Generic[Answer]):
     `over`) "qp" evades them as they come; the others meet them where they end. What they could not avoid is
     named in the answer. A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
 
-    With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
+    With a budget a frame ends with what it has found by then, and the next goes on from there; joints turn by at most
+    8 rad/s, where no `Hold` is relative to another frame, as other methods than "qp" may jump. Where it was not enough
     to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
 
     Raises:

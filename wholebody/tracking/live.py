@@ -87,7 +87,7 @@ class LiveDrag:
             self.methods = {"newton": "newton"}
             method = "newton" if method == "qp" else method
         self._undo: list[Any] = []
-        self._deepest = 0.0
+        self._deepest = self._open = 0.0
         self.let_go()
         self._state = self.scene.state(self.q)
         self.choose(method)
@@ -125,7 +125,7 @@ class LiveDrag:
             try:
                 frame = self._pushed(self._drag, place) if self.taken in self.things else self._drag.to(place)
                 if frame is not None:
-                    self.q, path = np.array(frame.q), frame.path
+                    self.q, path, self._open = np.array(frame.q), frame.path, frame.open
                     self._subject.arrived()
                 self._trouble = ""
             except WholebodyError as trouble:
@@ -140,14 +140,17 @@ class LiveDrag:
     def constrain(self, name: str, holds: bool) -> None:
         """Let one of `constraints` hold, or release it; the next frames close it. `undo` takes it back.
 
+        Where no handle was taken, the first one is, so that there are frames.
+
         Raises UnknownNameError where there is none, InputError if `holds` is neither True nor False.
         """
         known(name, self.constraints, "constraint")
         flag(holds, "holds")
         self._remember()
+        self._open = 0.0
         self._subject.constrain(name, holds)
-        if self.taken:
-            self._restart()
+        self.taken = self.taken or self.handles[0]
+        self._restart()
 
     def toggle(self, name: str) -> bool:
         """Hold a frame where it is, or release it; whether it is held now. Raises UnknownNameError for other names."""
@@ -178,6 +181,7 @@ class LiveDrag:
         if not self._undo:
             return False
         self.let_go()
+        self._open = 0.0
         self.q = self._subject.restore(self._undo.pop())
         return True
 
@@ -292,6 +296,7 @@ class LiveDrag:
         status = "drag a handle; click one to hold or release it"
         if self.taken:
             status = f"{verb} {self.taken} by {self.method.name}"
-        if self._trouble or self._stopped:
-            status = f"{status}: {self._trouble or self._stopped}"
+        apart = f"joints do not close, by {self._open:.3g} m or rad" if self._open > 1e-3 else ""
+        if said := self._trouble or self._stopped or apart:
+            status = f"{status}: {said}"
         return LiveFrame(self.q, error, len(contacts.distance), overlap, seconds, status)

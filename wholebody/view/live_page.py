@@ -15,20 +15,26 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
 from wholebody.dynamics.live_world import LiveWorld
+from wholebody.geometry.pieces import box_corners
+from wholebody.methods.newton.assembly import Assembly
 from wholebody.motion.files.gltf import triangles
 from wholebody.taskfile.task import View
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
-from wholebody.view.style import LOOK
+from wholebody.view.style import LOOK, object_color
 from wholebody.view.viser_server import viser_server
 
 SETTLING = 90  # frames after the mouse or a key lets go in which the figure still follows to where that was
 STILL = 1e-5  # m, rad: what moves less is not sent
 
-KEYS = """arrow keys move the chosen handle, shift with up and down moves it away and back, Escape: {escape}
+KEYS = """<div style="padding: 0 0.75em; font-size: 0.875em">{dots}<br>
+arrow keys move the chosen handle, shift with up and down moves it away and back, Escape: {escape}</div>
 <img src="data:," hidden onerror="document.documentElement.addEventListener('keydown', event =>
 event.key.startsWith('Arrow') && event.stopPropagation())">"""
-"""The legend of keys. Its script keeps arrow keys from viser, which would turn the camera by them too."""
+"""The legend of colours and keys. Its script keeps arrow keys from viser, which would turn the camera by them too."""
+
+FREE, HELD, THING = (70, 130, 220), (225, 90, 40), (90, 170, 90)
+"""Colours of handles, bytes."""
 
 
 class LivePage:
@@ -58,6 +64,7 @@ class LivePage:
         self._target: Any = None
         self._reached: Any = None
         self._settling = 0  # frames that are left after the mouse let go
+        self._mouse = -1  # the browser whose mouse has the handle
         self._sent = np.full((len(drag.scene.piece_owner), 7), np.nan)  # placements that were sent, x y z and x y z w
         self._state = drag.scene.state(drag.q)
         self._constraints: dict[str, Any] = {}
@@ -67,12 +74,7 @@ class LivePage:
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         self.server.scene.set_up_direction("+z")
         self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
-        middle = np.mean([drag.place(name) for name in drag.handles], axis=0)
-        camera = self.server.initial_camera
-        # m: from the front right of the middle of the handles
-        camera.position, camera.look_at = middle + np.array((2.2, -1.6, 0.6)), middle
-        if view.eye is not None:
-            camera.position, camera.look_at, camera.fov = view.eye, view.target, np.radians(LOOK.field_of_view)
+        self._look(view)
         self._pieces = self._draw(view.see_through)
         self._handles = {name: self._handle(name) for name in (*drag.handles, *drag.things)}
         self._panel()
@@ -98,31 +100,47 @@ class LivePage:
         finally:
             self.stop()
 
+    def _look(self, view: View) -> None:
+        """Place the camera where a view says, or to the front right, as far away as it takes to see all handles."""
+        places, camera = np.array([self.drag.place(name) for name in self.drag.handles]), self.server.initial_camera
+        target = places.mean(axis=0) if view.target is None else np.array(view.target)
+        away = np.array((2.2, -1.6, 0.6)) if view.eye is None else np.array(view.eye) - target
+        length = float(np.linalg.norm(away))
+        away, half = away / length, np.tan(np.radians(0.5 * LOOK.field_of_view))
+        nearer = (places - target) @ away
+        aside = np.linalg.norm(places - target - nearer[:, None] * away, axis=1)
+        fits = float((aside / (0.7 * half) + nearer).max())  # the handles within 0.7 of the picture's height
+        distance = max(fits, 0.6 if view.eye is None else length)  # m
+        camera.position, camera.look_at = target + distance * away, target
+        camera.fov = np.radians(LOOK.field_of_view)
+
     def _draw(self, see_through: Collection[str]) -> list[Any]:
         scene = self.drag.scene
-        pieces = []
-        for number, piece in enumerate(scene.geometry.geometryObjects):
-            thing = scene.objects.get(scene.piece_owner[number])
-            given = None if thing is None else thing.color
-            if given is None and type(piece.geometry).__name__ == "Halfspace":
-                given = LOOK.floor
-            color = (214, 180, 150) if thing is None else _bytes(given, number)
+        problem = getattr(self.drag, "problem", None)
+        painted = problem.colors if isinstance(problem, Assembly) else {}
+        pieces = list[Any]()
+        for owner, piece in zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True):
+            thing, ground = scene.objects.get(owner), type(piece.geometry).__name__ == "Halfspace"
+            own = tuple(piece.meshColor) if piece.overrideMaterial else LOOK.figure  # as a robot's file says
+            color = painted.get(owner.partition("/")[0], own)
+            if thing is not None:
+                color = thing.color or (LOOK.floor if ground else object_color(len(pieces)))
             # opacity of the figure, so that the handles in it are seen
             opacity = 0.7 if thing is None else None if thing.color is None else thing.color[3]
             if thing is not None and thing.name in see_through:
                 opacity = LOOK.see_through
-            mesh = triangles(piece.geometry)
+            mesh, rgb = triangles(piece.geometry), tuple(round(255 * part) for part in color[:3])
             pieces.append(
                 self.server.scene.add_mesh_simple(
-                    f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
-                    color=color, opacity=opacity, cast_shadow=False, receive_shadow=False,
+                    f"/pieces/{len(pieces)}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
+                    color=rgb, opacity=opacity, cast_shadow=False, receive_shadow=False,
                     visible=thing is not None or piece.meshColor[3] > 0.0,
                 )
             )  # fmt: skip
         return pieces
 
     def _handle(self, name: str) -> Any:
-        color = (90, 170, 90) if name in self.drag.things else _handle_color(name in self.drag.held)
+        color = THING if name in self.drag.things else HELD if name in self.drag.held else FREE
         ball = self.server.scene.add_icosphere(
             f"/handles/{name}", self._radius(name), color=color, position=self.drag.place(name), cast_shadow=False
         )
@@ -132,11 +150,11 @@ class LivePage:
             nonlocal offset
             with self._lock:
                 if event.phase == "start":
-                    self._settling = 0
+                    self._settling, self._mouse = 0, event.client_id
                     self.drag.take(name)
                     self._choice.value = name
-                if self.drag.taken != name:
-                    return  # undone meanwhile
+                if self.drag.taken != name or self._mouse != event.client_id:
+                    return  # undone meanwhile, or taken by another page or the keys
                 if event.phase == "start":
                     offset = self.drag.place(name) - np.array(event.start_position)
                 self._target = np.array(event.end_position) + offset
@@ -159,17 +177,20 @@ class LivePage:
         return ball
 
     def _radius(self, name: str) -> float:
-        """Of the ball of a handle, metres: small where others are near, such as fingertips and dominoes."""
-        here = self.drag.place(name)
+        """Of the ball of a handle, metres: small where others are near, as fingertips are, and smaller than a thing."""
+        here, scene = self.drag.place(name), self.drag.scene
+        pieces = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+        sizes = [float(np.ptp(box_corners(piece.geometry), axis=0).max()) for owner, piece in pieces if owner == name]
         others = (*self.drag.handles, *self.drag.things)
         apart = [float(np.linalg.norm(self.drag.place(other) - here)) for other in others]
-        return min(0.04, 0.5 * min((length for length in apart if length > 2e-3), default=1.0))
+        least = min((length for length in apart if length > 2e-3), default=1.0)
+        return min(0.04, 0.25 * min(least, *sizes, 1.0))
 
     def toggle(self, name: str) -> None:
         """Hold or release a frame."""
         with self._lock:
             held = self.drag.toggle(name)
-            self._handles[name].color = _handle_color(held)
+            self._handles[name].color = HELD if held else FREE
             self._boxes[name].value = held
 
     def _panel(self) -> None:
@@ -195,7 +216,9 @@ class LivePage:
                 self._constraints[name] = gui.add_checkbox(name, holds)
                 self._constraints[name].on_update(partial(self._constrained, self.drag, name))
         gui.add_button(again).on_click(self._undo)
-        gui.add_html(KEYS.format(escape=again))
+        meanings = {"free": FREE, "held": HELD, **({"thing": THING} if self.drag.things else {})}
+        dots = " ".join(f'<span style="color: rgb{color}">&#9679;</span> {word}' for word, color in meanings.items())
+        gui.add_html(KEYS.format(dots=dots, escape=again))
         gui.add_command(again, hotkey="escape").on_trigger(self._undo)
         for label, key, shift, way in (
             ("left", "arrowleft", None, (-1, 0, 0)), ("right", "arrowright", None, (1, 0, 0)),
@@ -214,9 +237,9 @@ class LivePage:
             with self._lock:
                 name = self._choice.value
                 if event.phase == "start":
-                    self._settling = 0
+                    self._settling, self._mouse = 0, event.client_id
                     drag.take(name, turn=True)
-                if drag.taken == name:
+                if drag.taken == name and self._mouse == event.client_id:
                     self._target = np.roll(event.target.wxyz, -1)
                     self._settling = SETTLING if event.phase == "end" else 0
 
@@ -243,7 +266,7 @@ class LivePage:
     def _pressed(self, way: Array, event: Any) -> None:
         """Move the chosen handle to the right, away or up, as this browser sees it."""
         with self._lock:
-            name = self._choice.value
+            name, self._mouse = self._choice.value, -1
             if self.drag.taken != name or self._target is None or len(self._target) != 3:
                 self.drag.take(name)
                 self._target = self.drag.place(name)
@@ -260,6 +283,8 @@ class LivePage:
         with self._lock:
             if self._constraints[name].value != drag.constraints[name]:
                 drag.constrain(name, self._constraints[name].value)
+                if self._target is None:  # frames close what is to hold now
+                    self._target, self._settling = drag.place(drag.taken), SETTLING
 
     def _share(self, world: LiveWorld) -> None:
         world.give_way = self._give_way.value
@@ -368,14 +393,3 @@ class LivePage:
             for number in np.flatnonzero(moved[:, 3:].any(axis=1)).tolist():
                 self._sent[number, 3:] = values[number, 3:]
                 self._pieces[number].wxyz = values[number, [6, 3, 4, 5]]
-
-
-def _handle_color(held: bool) -> tuple[int, int, int]:
-    return (225, 90, 40) if held else (70, 130, 220)
-
-
-def _bytes(color: tuple[float, float, float, float] | None, number: int) -> tuple[int, int, int]:
-    from wholebody.view import style
-
-    red, green, blue = (style.object_color(number) if color is None else color)[:3]
-    return round(255 * red), round(255 * green), round(255 * blue)

@@ -213,3 +213,16 @@ def test_an_arm_is_pushed_out_of_what_came_onto_it(planar_arm: Callable[..., wb.
     assert wb.assess(problem, out).penetration < 1e-4
     assert 1e-4 < np.abs(out - q).max() < 0.2
     assert scene.sweep(q, out, 5e-4) is None
+
+
+def test_hands_that_hold_each_other_stay_together_where_no_posture_is_free() -> None:
+    """A ball is in one hand, and neither the way back nor the goal frees it: the loop is not opened for that."""
+    scene = wb.Scene(wb.load("avatar"))
+    start = scene.figure.posture("standing")
+    palm = scene.state(start).frame(scene.figure.frame_id("left_palm")).translation
+    scene.add(wb.Sphere(0.05), name="ball", at=palm)
+    held = wb.Hold("left_palm", relative_to="right_palm")
+    problem = wb.Problem(scene, start, goals=[wb.Point("right_palm", (0.4, -0.1, 1.2))], constraints=[held])
+    q = wb.methods.CCD(restarts=0).tracker(problem, dt=0.02).frame(problem.start).q
+    (loop,) = (term for term in problem.constraints if isinstance(term, wb.Hold))
+    assert np.abs(loop.value(scene.state(q))).max() < 1.1e-3  # m, rad: as goals on the way

@@ -126,11 +126,12 @@ class CarriedFrame:
         self.node = limbs.carrier(self._joint)
         self.placement = floats(self._fixed)
 
-    def read(self, data: Any) -> None:
-        """Read what the limbs do not move from `data`, at the posture that `Limbs.read` has read."""
+    def read(self, data: Any) -> bool:
+        """Read what the limbs do not move from `data`, at the posture that `Limbs.read` has read; false for nothing."""
         joint = self._limbs.joints[self.node] if self.node >= 0 else 0
         if joint != self._joint:
             self.placement = floats(data.oMi[joint].actInv(data.oMi[self._joint] * self._fixed))
+        return joint != self._joint
 
     def rotation(self, data: Any) -> Array:
         """(3, 3) rotation at the joint placements of Pinocchio's data."""

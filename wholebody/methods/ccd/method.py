@@ -192,7 +192,10 @@ class _Search(Multistart[_Trial]):
             yield Attempt(starts, lambda q: self._attempt(q, free, "restart"), "")
 
     def _closed(self, best: _Trial) -> _Trial:
-        """A trial that misses the goals, or an intermediate posture, where loops are closed and nothing overlaps."""
+        """A trial that misses the goals, or a posture between, where loops are closed and nothing overlaps.
+
+        Without one, as time may end, the trial or the start, whose loops are less open.
+        """
         if not self._request.loops or self.solves(best):
             return best
         self._reach.begin(replace(self._request, goals=self._request.loops), Control(np.inf))
@@ -203,7 +206,7 @@ class _Search(Multistart[_Trial]):
             self._resolver.query(q)
             if closed.error <= self._method.tolerance and self._resolver.deepest <= self._tolerance:
                 return replace(best, q=q)
-        return best
+        return min(best, replace(best, q=start), key=lambda one: self._reach.error(one.q))
 
     def better(self, one: _Trial, other: _Trial) -> bool:
         """See `Multistart.better`."""
@@ -241,11 +244,11 @@ class _Search(Multistart[_Trial]):
             trial = _Trial(q, self._resolver.deepest, reached.error, reached.converged)
             if left:
                 q, left = self._resolver.resolve(q, self._rng)
-                trial = _Trial(q, self._resolver.deepest, self._error(q), reached.converged)
+                trial = _Trial(q, self._resolver.deepest, self._reach.error(q), reached.converged)
             if left and free is not None:
                 back = last_free(self._problem.scene.model, free, q, self._resolver.query, 12)  # halvings: to a 4000th
                 self._resolver.query(back)
-                trial = _Trial(back, self._resolver.deepest, self._error(back), True)
+                trial = _Trial(back, self._resolver.deepest, self._reach.error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
             self.trace.append(TraceEntry(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
             self.control.tell(self.trace[-1])
@@ -256,7 +259,3 @@ class _Search(Multistart[_Trial]):
                 break
         assert best is not None
         return best
-
-    def _error(self, q: Array) -> float:
-        """Largest error of the goals at a posture q (nq,)."""
-        return self._reach.run(q, inf, 0)[1].error

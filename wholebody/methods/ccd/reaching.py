@@ -79,9 +79,7 @@ class Reach:
         """Descend from a posture q (nq,) until every goal is met to a tolerance, at most `most` sweeps."""
         limbs = self.limbs
         q = q.copy()
-        pin.forwardKinematics(self._model, self._data, q)
-        limbs.read(q, self._data)
-        limbs.forward()
+        self._read(q)
         for guard in self._guards:
             guard.read(q, self._data)
             guard.keep()
@@ -110,12 +108,22 @@ class Reach:
         limbs.write(q)
         return q, Reached(error, sweeps, converged)
 
+    def error(self, q: Array) -> float:
+        """Largest error of the goals at a posture q (nq,), metres or radians."""
+        self._read(q)
+        return _Pursuit(self.limbs, self._data, self._goals).aims.error
+
+    def _read(self, q: Array) -> None:
+        """Move the limbs to a posture q (nq,)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        self.limbs.read(q, self._data)
+        self.limbs.forward()
+
     def disturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with random joints, of a deviation `size` [rad, m] or, if infinite, anywhere."""
         q = q.copy()
         limbs = self.limbs
-        pin.forwardKinematics(self._model, self._data, q)
-        limbs.read(q, self._data)
+        self._read(q)
         for node, value in enumerate(limbs.values.tolist()):
             low, high = max(limbs.lower[node], -pi), min(limbs.upper[node], pi)
             new = float(rng.uniform(low, high)) if size == inf else value + size * float(rng.normal())

@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State, joint_support
+from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.ccd.guards import Kept
 from wholebody.methods.ccd.limbs import Vector, movable, three
@@ -139,9 +139,7 @@ class _Reader:
             self.refused.append(f"{where}, which the joints that reach move too")
         elif np.abs(term.value(self._state.update(self._problem.start))).max() > 1e-6:  # m, rad
             self.refused.append(f"{where}, which is elsewhere at the start")
-        model, carried = self._problem.scene.model, self._carried(term)
-        freedoms = enumerate(zip(model.idx_vs, model.nvs, strict=True))
-        self.fixed |= {joint for joint, (first, count) in freedoms if joint and carried[first : first + count].any()}
+        self.fixed |= set(self._state.column_joint[self._carried(term) != 0.0].tolist())
 
     def _moves(self, term: Hold) -> bool:
         """Whether joints that reach move a frame against what it is held at."""
@@ -150,7 +148,7 @@ class _Reader:
 
     def _carried(self, term: Hold) -> Array:
         """(nv,) which freedoms move a frame against what it is held at; nothing moves the world."""
-        support = joint_support(self._problem.scene.model)
+        support = self._state.support
         return np.asarray(support[term.residual.place.joint] - support[term.residual.base.joint])
 
     def others(self) -> None:
