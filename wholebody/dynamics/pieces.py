@@ -14,6 +14,7 @@ from wholebody.base.compiled import compiled
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
+from wholebody.geometry.flesh import is_flesh
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, Surface, mass_properties, surface
@@ -47,9 +48,10 @@ class PlacedProximity(Proximity):
     """Distances between pieces that stand where they are said to stand."""
 
     def place(self, data: Array) -> Array:
-        """Take placements (pieces, 4, 3) over, in the place of Pinocchio's data; see `Contacts.placements`."""
+        """Take placements (pieces, 4, 3), flesh as of bent limbs, in the place of Pinocchio's data; the pieces' own."""
         self.distances.put(data)
-        return data
+        self.distances.place_flesh()
+        return self.distances.placed
 
 
 class SweptPoints(NamedTuple):
@@ -140,6 +142,7 @@ class Pieces:
                 at = scene.model.frames[scene.frame_id(owner)].placement.actInv(piece.placement)
                 made_of.append(HUMAN)
             pieces.append(pin.GeometryObject(piece.name, 0, 0, pin.SE3.Identity(), piece.geometry))
+            pieces[-1].meshPath = piece.meshPath if is_flesh(piece) else ""
             body.append(self.index[owner])
             local.append([*at.rotation.T, at.translation])
         self.body: Indices = np.array(body, dtype=np.intp)
