@@ -12,7 +12,7 @@ from wholebody.base.dense_kernel import factorise, gram, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
-COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
+COARSE = 2e-4  # m/s: what sweeps leave further from the laws of contact is refined
 
 
 @compiled(error_model="numpy", fastmath=FAST)
@@ -266,34 +266,42 @@ def impulses(
     With those of the step before as a `start`, 1e-6 m/s is exact enough, and the next step goes on from there.
     """
     velocity, impulse = speed.copy(), np.zeros((len(friction), 3)) if start is None else start.copy()
-    most, tolerance = (1000, 1e-7) if start is None else (500, 1e-6)
+    most, tolerance = (1000, 1e-7) if start is None else (60, 1e-6)
     solve(mobility, velocity, (friction, target), impulse, most, tolerance)
     if violation(mobility, velocity, friction, target, impulse) > COARSE:
-        impulse = _refined(mobility, speed, friction, target, impulse)
+        impulse = _refined(mobility, velocity, friction, target, impulse)
         velocity = speed + mobility @ impulse.ravel()
     return impulse, velocity
 
 
-def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impulse: Array) -> Array:
-    """The impulses (m, 3) of `solve`, or of the alternating direction method where they are nearer."""
-    # sweeps pass on a thousandth of an impulse where much rests on little; this method factors the matrix
-    rest = speed.copy()
-    rest[::3] -= target
-    own = np.maximum(mobility.diagonal().reshape(-1, 3), 1e-9)
+def _refined(mobility: Array, velocity: Array, friction: Array, target: Array, impulse: Array) -> Array:
+    """The impulses (m, 3) of `solve`, with which the velocities are (3 m,), or those of the alternating direction method where nearer.
+
+    Sweeps pass on a thousandth of an impulse where much rests on little; this method factors the matrix of the points
+    that bear or approach, and begins where the sweeps ended.
+    """
+    best, least, share = impulse, violation(mobility, velocity, friction, target, impulse), 1e-2
+    speed, own = velocity - mobility @ impulse.ravel(), np.maximum(mobility.diagonal().reshape(-1, 3), 1e-9)
     own[:, 1:] = own[:, 1:].max(axis=1)[:, None]
-    now, dual, share = np.zeros_like(rest), -rest, 1e-3
-    best, least = impulse, violation(mobility, speed + mobility @ impulse.ravel(), friction, target, impulse)
-    for _ in range(8):  # of 50 steps
-        weight = share * own.ravel()
-        broken, moved = _split(mobility, weight, rest, friction, now, dual, 50)
-        off = violation(mobility, speed + mobility @ now, friction, target, now.reshape(-1, 3))
-        if off < least:
-            best, least = now.reshape(-1, 3).copy(), off
-        if off < 0.1 * COARSE:
-            break
-        ratio = broken / max(share * moved, 1e-300)
-        if not 0.2 < ratio < 5.0:
-            share = min(max(share * min(max(np.sqrt(ratio), 1e-3), 1e3), 1e-6), 1e6)
+    for _ in range(3):  # each with the points that approached after the one before
+        chosen = np.flatnonzero((impulse[:, 0] > 0.0) | (velocity[::3] < target + 1e-6))
+        rows = (3 * chosen[:, None] + np.arange(3)).ravel()
+        among, rest, dual = mobility[np.ix_(rows, rows)], speed[rows], -velocity[rows]
+        rest[::3] -= target[chosen]
+        dual[::3] += target[chosen]
+        now, rough, impulse = impulse[chosen].ravel(), friction[chosen], np.zeros_like(impulse)
+        for _ in range(8):  # of 20 steps
+            broken, moved = _split(among, share * own[chosen].ravel(), rest, rough, now, dual, 20)
+            impulse[chosen] = now.reshape(-1, 3)
+            velocity = speed + now @ mobility[rows]
+            off = violation(mobility, velocity, friction, target, impulse)
+            if off < least:
+                best, least = impulse.copy(), off
+            if off < COARSE:
+                return best
+            ratio = broken / max(share * moved, 1e-300)
+            if not 0.2 < ratio < 5.0:
+                share = min(max(share * min(max(np.sqrt(ratio), 1e-3), 1e3), 1e-6), 1e6)
     return best
 
 
