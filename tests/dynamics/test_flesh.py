@@ -31,7 +31,7 @@ def test_flesh_comes_nearer_as_its_contact_rows_say(side: str) -> None:
     q[2] -= gap(q) - 0.01  # m
     figure_moving = Articulated(scene, q, wb.Actuated(figure, stiffness=0.0, damping=0.0), None)
     figure_moving.velocity[:3] = 4.0  # m/s: the thigh can meet the floor
-    points = figure_moving._points(1.0 / 60.0, {})
+    points = figure_moving._touching.points(q, figure_moving.velocity, 1.0 / 60.0, {})
     step = 1e-4 * np.eye(model.nv)
     rates = [(gap(pin.integrate(model, q, e)) - gap(pin.integrate(model, q, -e))) / 2e-4 for e in step]
     row = points.figure[3 * np.flatnonzero(points.pair == 2 * model.nv + number)[0]]

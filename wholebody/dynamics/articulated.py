@@ -24,15 +24,14 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.blows import BOUNCE, left_for_later
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, torques, turned
+from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques, turned
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
-from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
+from wholebody.dynamics.sleeping import AFTER, STILL
 from wholebody.dynamics.step_program import SKIN, Impulses
+from wholebody.dynamics.touching import Touching
 from wholebody.figures.state import free_roots
-from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
-from wholebody.geometry.flesh import flesh_of
 from wholebody.scene.scene import Scene
 
 LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
@@ -61,35 +60,30 @@ class Articulated:
         self._gravity = np.array(GRAVITY if engine is None else engine.gravity) if gravity is None else gravity
         self._model.gravity.linear = self._gravity
         self._data, self._workspace = self._model.createData(), scene.workspace()
-        self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
-        owners = self._workspace.owners
-        self._names = list(dict.fromkeys((*(() if engine is None else engine.names), *owners)))  # the engine's first
-        number = {name: k for k, name in enumerate(self._names)}
-        self._owners: Indices = np.array([number[name] for name in owners], dtype=np.intp)
-        free = self._owners < (0 if engine is None else len(engine.bodies))
+        self._touching = Touching(scene, self._workspace, self._model, engine)
         # m: most distances of pairs that a step may lead into each other; the engine looks at the others
-        self._own_pairs = np.where(free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
+        self._own_pairs = np.where(self._touching.free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
         self._sag = np.zeros(2 * self._model.nv + len(self._own_pairs) + 1)  # m/s2: by limit, pair; the last for others
-        self._old, self._flesh = Impulses.nothing(0), flesh_of(scene.geometry)
+        self._old = Impulses.nothing(0)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
-        self._turning, self._asked, self._masses = 0.0, b"", np.zeros((0, 0))  # rad/s
+        self._tracked, self._turning, self._asked, self._masses = self.q, 0.0, b"", np.zeros((0, 0))  # rad/s
+        self._slow_for, self._beside = 0.0, list[str]()  # s; bodies that the last step was about
         own = pin.crba(self._model, self._data, self.q).diagonal()
         light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
         self._model.armature += np.where(light, 1e-5, 1e-3 * own * aligning(self._model))
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
-        single = [(one.idx_q, one.idx_v) for one in self._model.joints[1:] if one.nq == one.nv == 1]  # [0]: the world
         driven = (self.stiffness > 0.0) | (self.damping > 0.0)
+        self._driven = bool(driven.any())
         freedoms = {k: np.arange(6) + self._model.idx_vs[k] for k in free_roots(self._model)}
         self._roots = [k for k in freedoms if not driven[freedoms[k]].any()]
         self._adrift: Indices = np.concatenate([np.zeros(0, dtype=np.intp), *(freedoms[k] for k in self._roots)])
-        self._limited: Indices = np.array(single, dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
-        compiled_kernel()
 
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
+        if self._rests(tracked, dt, moved, segments):
+            return
         steady = pin.difference(self._model, self._tracked, tracked) / dt
         # so often steps may be made again to end at an impact, or end early: what is squeezed meets thousands
         now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
@@ -102,6 +96,27 @@ class Articulated:
             now, left = now + step, left - step
             self.ends.append(now)
         self._tracked = np.array(tracked)
+        slow = np.abs(self.velocity).max(initial=0.0) < 1.0 and self._touching.fastest(self.q, self.velocity) < STILL
+        self._slow_for = self._slow_for + dt if slow else 0.0
+
+    def _rests(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> bool:
+        """Whether the figure lies still for a frame, as what lies beside it does, and nothing hits it; then it is over.
+
+        What is free of contacts and springs drifts on, however slow it is.
+        """
+        engine, pulled = self._engine, self._driven and bool((tracked != self._tracked).any())
+        floats = len(self._roots) > 0 and not len(self._old.pair)
+        if self._slow_for < AFTER or moved or pulled or floats or self._touching.awake(self._beside):
+            return False
+        back = None if engine is None else engine.way_back()
+        frame = None if engine is None else engine.advance(dt, yielding=segments)
+        if back is not None and frame is not None and not segments.keys().isdisjoint(frame.wrenches):
+            back()
+            self._slow_for = 0.0
+            return False
+        self.velocity, self.impulses = np.zeros_like(self.velocity), {}
+        self.frames, self.ends = [] if frame is None else [frame], [dt]
+        return True
 
     def energy(self) -> float:
         """Kinetic and potential energy, joules."""
@@ -152,7 +167,11 @@ class Articulated:
     ) -> tuple[float, EngineFrame | None, bool]:
         """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
-        points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
+        points, began, start = (
+            self._touching.points(self.q, self.velocity, planned, moved),
+            self.energy(),
+            self.velocity,
+        )
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
         time = self._until_impact(points, min(time, STEP) if points.bodies else time)
@@ -160,6 +179,7 @@ class Articulated:
         springs = Springs(self.stiffness, self.damping, apart, steady)
         driven, self.velocity, mean, borne = free_motion(model, self._data, self._inertia, self.q, begin, time, springs)
         points, bearing, parting = self._bear(driven, points, time)
+        self._beside = points.bodies
         blow = np.vstack([blow, np.zeros((len(bearing) - len(blow), 3))])
         impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
         pin.centerOfMass(model, self._data, self.q)
@@ -207,56 +227,6 @@ class Articulated:
         began = points.gap[points.pair >= 2 * self._model.nv].min(initial=0.0)
         return bool(near.distance.min(initial=0.0) < min(-1e-4, began))  # m
 
-    def _points(self, time: float, moved: Moved) -> Points:
-        """What the figure can touch within a time, and the joint limits that it can reach."""
-        workspace, engine, model = self._workspace, self._engine, self._model
-        free = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
-        workspace.place({**free, **{name: way[0] for name, way in moved.items()}})
-        twists = np.zeros((len(self._names), 6))  # at the origin, of what is moved
-        for name, (before, after) in moved.items():
-            twists[self._names.index(name)] = pin.log6(after * before.inverse()).vector / time
-        speed = self._approach(twists)
-        # m: what is hit in this step can be faster after it
-        most = 2e-3 + np.minimum(0.2, time * (1.5 * speed + 0.5 * min(float(speed.max(initial=0.0)), 10.0)))
-        near = workspace.near(self.q, float(most.max(initial=0.0)), most)
-        rows = self._rows.rows(near)
-        kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
-        contact, wrench, met = rows.contact[kept], rows.wrench[kept], len(kept)
-        normal, place = wrench[:, :3], places(wrench, near, contact)
-        owner, gap, pair = self._owners[near.pair[contact]], rows.gap[kept], near.number[contact]
-        if engine is not None and (touched := np.unique(owner[owner < len(free)])).size:
-            others = engine.contacts([self._names[k] for k in touched.tolist()])
-            owner, gap = np.concatenate([owner, others.bodies]), np.concatenate([gap, np.maximum(others.gap, SKIN)])
-            normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
-            pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
-        bodies = np.unique(owner[owner < len(free)])
-        made = Points.room(len(owner), model.nv, [self._names[k] for k in bodies.tolist()], engine)
-        made.axes[:], made.place[:], made.gap[:] = axes_of(normal), place, gap
-        directions = np.concatenate([made.axes, cross(place[:, None], made.axes)], axis=2)
-        joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
-        made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
-        made.add_flesh(workspace.state, workspace.geometry, self._flesh, near.pair[contact])
-        made.restitution[:], made.friction[:] = self._surfaces(owner)
-        slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
-        slot[bodies] = np.arange(len(bodies))
-        centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
-        made.add_things(owner, slot, centres, twists, directions)
-        made.pair[:] = 2 * model.nv + pair  # after the limits
-        return made.with_limits(model, self._limited, self.q, 0.02 + 1.5 * time * np.abs(self.velocity))
-
-    def _approach(self, moved: Array) -> Array:
-        """How fast the pieces of every pair can approach each other (pairs,), m/s; `moved` (n, 6): see `_points`."""
-        workspace, twists = self._workspace, moved
-        state = workspace.state.update(self.q)
-        twist = ((state.support * state.spread(self.velocity)) @ state.columns)[workspace.table.joint]
-        if self._engine is not None:
-            bodies, free = self._engine.state.bodies, len(self._engine.bodies)
-            own = bodies.twist[:free]
-            twists = moved.copy()
-            twists[:free] = np.hstack([own[:, :3] + cross(bodies.position[:free], own[:, 3:]), own[:, 3:]])
-        twist = twist + twists[self._owners]
-        return approaches(workspace.table, workspace.proximity.place(state.data)[:, 3], twist)
-
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
         engine = self._engine
@@ -303,7 +273,7 @@ class Articulated:
             # impulses turn joints towards limits that were far away
             ahead = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ found.ravel())
             reach = np.full(len(ahead), np.inf) if again == 2 else time * np.abs(ahead)
-            count, points = len(found), points.with_limits(self._model, self._limited, self.q, reach)
+            count, points = len(found), self._touching.limits(points, self.q, reach)
             if len(points.gap) == count:
                 break
             found = np.vstack([found, np.zeros((len(points.gap) - count, 3))])

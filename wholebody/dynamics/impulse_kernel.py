@@ -275,7 +275,7 @@ def impulses(
 
 
 def _refined(mobility: Array, velocity: Array, friction: Array, target: Array, impulse: Array) -> Array:
-    """The impulses (m, 3) of `solve`, with which the velocities are (3 m,), or those of the alternating direction method where nearer.
+    """Impulses (m, 3) nearer to the laws of contact than those of `solve`, with which the velocities are (3 m,).
 
     Sweeps pass on a thousandth of an impulse where much rests on little; this method factors the matrix of the points
     that bear or approach, and begins where the sweeps ended.
