@@ -24,8 +24,8 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.blows import BOUNCE, left_for_later
-from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques, turned
-from wholebody.dynamics.frame import EngineFrame, impacts
+from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques
+from wholebody.dynamics.frame import EngineFrame, Given, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.sleeping import AFTER, STILL
@@ -67,7 +67,9 @@ class Articulated:
         self._old = Impulses.nothing(0)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked, self._turning, self._asked, self._masses = self.q, 0.0, b"", np.zeros((0, 0))  # rad/s
+        self._tracked, self._asked, self._masses = self.q, b"", np.zeros((0, 0))
+        self._turned, self._turning = 0.0, 0.0  # rad in the last step, rad/s
+        self._seats: tuple[Mapping[str, int], Indices, Array] | None = None  # of segments in their joints
         self._slow_for, self._beside = 0.0, list[str]()  # s; bodies that the last step was about
         own = pin.crba(self._model, self._data, self.q).diagonal()
         light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
@@ -114,7 +116,7 @@ class Articulated:
             back()
             self._slow_for = 0.0
             return False
-        self.velocity, self.impulses = np.zeros_like(self.velocity), {}
+        self.velocity = np.zeros_like(self.velocity)  # its impulses go on as in the frame before
         self.frames, self.ends = [] if frame is None else [frame], [dt]
         return True
 
@@ -146,7 +148,7 @@ class Articulated:
         while True:
             done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
-            angle = turned(self._workspace, figure[0], self.q)
+            angle = self._turned
             far = angle > FAR or sunk
             if far and done > STEP:
                 most = STEP
@@ -167,11 +169,8 @@ class Articulated:
     ) -> tuple[float, EngineFrame | None, bool]:
         """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
-        points, began, start = (
-            self._touching.points(self.q, self.velocity, planned, moved),
-            self.energy(),
-            self.velocity,
-        )
+        began, start, stood = self.energy(), self.velocity, self._touching.joints(self.q)
+        points = self._touching.points(self.q, start, planned, moved)
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
         time = self._until_impact(points, min(time, STEP) if points.bodies else time)
@@ -197,24 +196,26 @@ class Articulated:
         # what parts an overlap has its energy from nowhere
         work -= np.maximum(0.0, (bearing * parting.reshape(-1, 3)).sum(axis=1))
         paid = float(motor @ moves + work[points.driven].sum())
-        motions = self._move(moves, segments, drifted, np.inf if self.stiffness.any() else began + paid)
-        motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
+        self._move(moves, drifted, np.inf if self.stiffness.any() else began + paid)
+        stands = self._touching.joints(self.q)
+        self._turned = self._touching.turned(stood, stands)
+        motions = {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         again = time > SHORTEST and self._stops > 0
         ended = points.gap + points.figure[::3] @ moves + time * points.given[::3]
-        if self._sunk(points, ended, time, {name: motions[name][1] for name in moved}) and again:
+        if self._sunk(points, ended, time, {name: way[1] for name, way in motions.items()}) and again:
             return time, None, True
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None, False
-        held = points.held(bearing)
+        held, places = points.held(bearing), self._carried(segments, stood, stands)
         before = engine.energy(), self.energy()
-        frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
+        frame = engine.advance(time, places.and_others(motions), held, segments, BOUNCE if again else np.inf)
         given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
         if not again and left_for_later(engine, frame, given, before, lambda some: self._reacted(some, segments)[1]):
             paid = sum(before) - engine.energy()
         else:
-            ways = {name: pin.log6(motions[name][1] * motions[name][0].inverse()).vector for name in given}
+            ways = {name: places.way(name) for name in given}
             paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
         self._react(given, paid, segments)
         return time, frame, False
@@ -222,7 +223,7 @@ class Articulated:
     def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
         """Whether a step of points that sought gaps (m,) led deeper into what the engine does not keep apart."""
         self._workspace.place(moved)
-        near = self._workspace.near(self.q, 1e-3, self._own_pairs)
+        near = self._workspace.proximity.query(self._workspace.state.at(self.q).data, 1e-3, self._own_pairs)
         self._sag = points.sag(ended, near, time, len(self._sag))
         began = points.gap[points.pair >= 2 * self._model.nv].min(initial=0.0)
         return bool(near.distance.min(initial=0.0) < min(-1e-4, began))  # m
@@ -311,11 +312,9 @@ class Articulated:
                 self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + wrench[:3]
 
-    def _move(
-        self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float
-    ) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints by a way (nv,), and nothing above a potential energy [J]; the motions of the segments."""
-        model, data, before = self._model, self._data, self._placements(segments)
+    def _move(self, way: Array, drifted: Sequence[tuple[pin.Force, Array]], energy: float) -> None:
+        """Move the joints by a way (nv,), and nothing above a potential energy [J]."""
+        model, data = self._model, self._data
         start, lowest = self.q, self._potential()
         self.q = np.array(pin.integrate(model, start, way))
         pin.centerOfMass(model, data, self.q)
@@ -326,12 +325,19 @@ class Articulated:
         if rise > most:  # of so little, the rise is nearly proportional to the way
             part = 0.99 * most / rise * pin.difference(model, start, self.q)
             self.q = np.array(pin.integrate(model, start, part))
-        after = self._placements(segments)
-        return {name: (before[name], after[name]) for name in segments}
 
-    def _placements(self, segments: Mapping[str, int]) -> dict[str, pin.SE3]:
-        state = self._workspace.state.update(self.q)
-        return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
+    def _carried(self, segments: Mapping[str, int], before: Array, after: Array) -> Given:
+        """The motions of segments whose joints are at placements (joints, 4, 3) before and after."""
+        if self._seats is None or self._seats[0] is not segments:
+            frames = [self._model.frames[number] for number in segments.values()]
+            joints: Indices = np.array([frame.parentJoint for frame in frames], dtype=np.intp)
+            seats = np.array([frame.placement.homogeneous for frame in frames]).reshape(-1, 4, 4)
+            self._seats = segments, joints, seats
+        _, joints, seats = self._seats
+        placed = np.zeros((len(joints), 2, 4, 4))
+        placed[:, 0, :3], placed[:, 1, :3] = before[joints].transpose(0, 2, 1), after[joints].transpose(0, 2, 1)
+        placed[:, :, 3, 3] = 1.0
+        return Given(list(segments), placed @ seats[:, None])
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
         """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`."""

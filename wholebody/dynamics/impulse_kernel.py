@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled, with_loops
 from wholebody.base.dense_kernel import factorise, gram, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
@@ -305,11 +305,93 @@ def _refined(mobility: Array, velocity: Array, friction: Array, target: Array, i
     return best
 
 
+@compiled(error_model="numpy", fastmath=FAST)
+def approaches(pairs: Indices, reach: Array, centres: Array, twist: Array) -> Array:
+    """Bounds (pairs,) [m/s] of the approach of pieces; arguments as of `touching.approaches`, with its least reach."""
+    found = np.empty(len(pairs))
+    for number in range(len(pairs)):
+        p, q = pairs[number, 0], pairs[number, 1]
+        piece = p if reach[p] < reach[q] else q
+        speed, spin = 0.0, 0.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            one, other = twist[p, 3 + i] - twist[q, 3 + i], twist[p, 3 + j] - twist[q, 3 + j]
+            speed += (twist[p, k] - twist[q, k] + one * centres[piece, j] - other * centres[piece, i]) ** 2
+            spin += one**2
+        found[number] = np.sqrt(speed) + reach[piece] * np.sqrt(spin)
+    return found
+
+
+@compiled(error_model="numpy", fastmath=FAST)
+def point_rows(
+    points: tuple[Array, Array, Indices],
+    joints: tuple[Indices, Array, Array],
+    bodies: tuple[Indices, Array, Array],
+    found: tuple[Array, Array, Array, Array, Mask],
+) -> None:
+    """Write axes and velocities of points, of which those of the figure come first.
+
+    Args:
+        points: normals and places (m, 3), and the numbers (m, 2) of both bodies.
+        joints: the joints (k, 2) of the figure's points, support (joints, nv) and jacobian (6, nv) as in `State`.
+        bodies: the place (n,) of each body among those that move by themselves, -1 for others; centres of mass (b, 3)
+            of those; twists (n, 6) at the origin, of what is moved, zero for others.
+        found: `axes`, `figure`, `things`, `given` and `driven` as in `coupling.Points`, all zero.
+    """
+    (normal, place, owner), (joint, support, jacobian), (slot, centres, twists) = points, joints, bodies
+    axes, figure, things, given, driven = found
+    for c in range(len(normal)):
+        least = 0
+        for k in range(1, 3):
+            if abs(normal[c, k]) < abs(normal[c, least]):
+                least = k
+        i, j = (least + 1) % 3, (least + 2) % 3
+        size = np.sqrt(normal[c, i] ** 2 + normal[c, j] ** 2)
+        # normal x e, of the axis e that is nearest to a right angle with it
+        axes[c, 1, least], axes[c, 1, i], axes[c, 1, j] = 0.0, normal[c, j] / size, -normal[c, i] / size
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            axes[c, 0, k] = normal[c, k]
+            axes[c, 2, k] = normal[c, i] * axes[c, 1, j] - normal[c, j] * axes[c, 1, i]
+        for r in range(3):
+            row, axis = 3 * c + r, axes[c, r]
+            turn = (
+                place[c, 1] * axis[2] - place[c, 2] * axis[1],
+                place[c, 2] * axis[0] - place[c, 0] * axis[2],
+                place[c, 0] * axis[1] - place[c, 1] * axis[0],
+            )
+            for n in range(figure.shape[1] if c < len(joint) else 0):
+                share = support[joint[c, 1], n] - support[joint[c, 0], n]
+                if share != 0.0:
+                    total = 0.0
+                    for k in range(3):
+                        total += axis[k] * jacobian[k, n] + turn[k] * jacobian[3 + k, n]
+                    figure[row, n] = share * total
+            for side in range(2):
+                body, sign = owner[c, side], 2.0 * side - 1.0
+                b = slot[body]
+                for k in range(3):
+                    rate = axis[k] * twists[body, k] + turn[k] * twists[body, 3 + k]
+                    given[row] += sign * rate
+                    if twists[body, k] != 0.0 or twists[body, 3 + k] != 0.0 or b >= 0:
+                        driven[c] = True
+                    if b >= 0:
+                        i, j = (k + 1) % 3, (k + 2) % 3
+                        things[row, 6 * b + k] = sign * axis[k]
+                        lever = centres[b, i] * axis[j] - centres[b, j] * axis[i]
+                        things[row, 6 * b + 3 + k] = sign * (turn[k] - lever)
+
+
 @with_loops(__name__)
 def compiled_kernel(_: Any) -> None:
     """The loop."""
     eye, three, one = np.eye(3), np.zeros(3), np.zeros(1)
+    none, pairs, rows = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp), np.zeros((0, 3))
     mobilities(eye, eye)
+    approaches(pairs, one, rows, np.zeros((0, 6)))
+    axes, flags = np.zeros((0, 3, 3)), np.zeros(0, dtype=bool)
+    moved = none, rows, np.zeros((0, 6))
+    point_rows((rows, rows, pairs), (pairs, eye, np.zeros((6, 3))), moved, (axes, rows, rows, np.zeros(0), flags))
     _by_cholesky(eye, three)
     add_bodies(eye, np.zeros((3, 6)), np.zeros((1, 6, 6)))
     solve(eye, three, (one, one), np.zeros((1, 3)), 1, 1e-9)

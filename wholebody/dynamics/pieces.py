@@ -33,14 +33,18 @@ class Surfaces:
     """What happens where two of so many named bodies touch, asked once for each two."""
 
     def __init__(self, scene: Scene, names: Sequence[str]) -> None:
-        self._scene, self._names, self._known = scene, names, dict[tuple[int, int], Surface]()
+        self._scene, self._names = scene, names
+        self._known = np.full((len(names), len(names), 2), np.nan)
 
     def __call__(self, both: Indices) -> tuple[Array, Array]:
         """Restitution and friction (k,) of bodies (k, 2)."""
-        pairs, known = [(first, second) for first, second in both.tolist()], self._known
-        for first, second in set(pairs) - known.keys():
-            known[first, second] = surface_of(self._scene, self._names[first], self._names[second])
-        found = np.array([known[pair] for pair in pairs]).reshape(-1, 2)
+        first, second = both.T
+        found = self._known[first, second]
+        unknown = np.isnan(found[:, 0])
+        if unknown.any():
+            for one, other in set(map(tuple, both[unknown].tolist())):
+                self._known[one, other] = surface_of(self._scene, self._names[one], self._names[other])
+            found = self._known[first, second]
         return found[:, 0], found[:, 1]
 
 

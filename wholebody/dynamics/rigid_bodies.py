@@ -361,17 +361,14 @@ class RigidBodies:
 
     def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""
-        state = self.state
-        way = self._travel(time)
+        state, way = self.state, self._travel(time)
         self._margin = 1.5 * way + 2e-3  # m
         self._near = self._finder.near(state.bodies.position, state.bodies.rotation, self._margin, state.active)
         return float(self._near.distance.min(initial=np.inf))
 
     def _travel(self, time: float) -> Array:
         """Most that a point of each body (n,) moves in a time, metres."""
-        state = self.state
-        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.lever
-        return np.asarray((speed + np.where(state.bodies.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
+        return np.asarray(motion_kernel.travel(self.state.bodies, self._pieces.lever, self.gravity, time))
 
     def _separate(self, least: float) -> tuple[float, float]:
         """Part pieces nearer than `LEAST_GAP`; the least distance then, and the energy that was not paid [J]."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, cross
-from wholebody.dynamics.coupling import Moved, Points, approaches, axes_of
+from wholebody.dynamics import impulse_kernel
+from wholebody.dynamics.coupling import Moved, Points, approaches
 from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
@@ -32,6 +35,8 @@ class Touching:
         self._owners: Indices = np.array([self._number[name] for name in workspace.owners], dtype=np.intp)
         self._bodies = () if engine is None else engine.bodies
         self.free: Mask = self._owners < len(self._bodies)
+        self._carrying = np.unique(workspace.table.joint)
+        self._where = np.full((len(self._bodies), 12), np.nan)
         self._surfaces = Surfaces(scene, self._names)
         single = [(one.idx_q, one.idx_v) for one in model.joints[1:] if one.nq == one.nv == 1]  # [0]: the world
         self._limited: Indices = np.array(single, dtype=np.intp).reshape(-1, 2)
@@ -40,10 +45,7 @@ class Touching:
     def points(self, q: Array, velocity: Array, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, at a posture (nq,) and a velocity (nv,), and limits in its reach."""
         workspace, engine, model, free = self._workspace, self._engine, self._model, len(self._bodies)
-        places_now = {name: way[0] for name, way in moved.items()}
-        if engine is not None:
-            places_now |= {name: engine.placement(name) for name in self._bodies}
-        workspace.place(places_now)
+        self._place({name: way[0] for name, way in moved.items()})
         twists = np.zeros((len(self._names), 6))  # at the origin, of what is moved
         for name, (before, after) in moved.items():
             twists[self._number[name]] = pin.log6(after * before.inverse()).vector / time
@@ -53,8 +55,8 @@ class Touching:
         near = workspace.proximity.query(workspace.state.data, float(most.max(initial=0.0)), most)
         rows = self._rows.rows(near)
         kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
-        contact, wrench, met = rows.contact[kept], rows.wrench[kept], len(kept)
-        normal, place = wrench[:, :3], places(wrench, near, contact)
+        contact, wrench, sides = rows.contact[kept], rows.wrench[kept], np.stack([rows.first, rows.second], axis=1)
+        normal, place = np.ascontiguousarray(wrench[:, :3]), places(wrench, near, contact)
         owner, gap, pair = self._owners[near.pair[contact]], rows.gap[kept], near.number[contact]
         if engine is not None and (touched := np.unique(owner[owner < free])).size:
             others = engine.contacts([self._names[k] for k in touched.tolist()])
@@ -63,26 +65,48 @@ class Touching:
             pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
         bodies = np.unique(owner[owner < free])
         made = Points.room(len(owner), model.nv, [self._names[k] for k in bodies.tolist()], engine)
-        made.axes[:], made.place[:], made.gap[:] = axes_of(normal), place, gap
-        directions = np.concatenate([made.axes, cross(place[:, None], made.axes)], axis=2)
-        joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
-        made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
-        made.add_flesh(workspace.state, workspace.geometry, self._flesh, near.pair[contact])
+        made.place[:], made.gap[:] = place, gap
         made.restitution[:], made.friction[:] = self._surfaces(owner)
+        made.pair[:] = 2 * model.nv + pair  # after the limits
         slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
         slot[bodies] = np.arange(len(bodies))
         centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
-        made.add_things(owner, slot, centres, twists, directions)
-        made.pair[:] = 2 * model.nv + pair  # after the limits
+        state = workspace.state
+        impulse_kernel.point_rows(
+            (normal, place, owner), (sides[kept], state.support, np.ascontiguousarray(state.jacobian)),
+            (slot, centres, twists), (made.axes, made.figure, made.things, made.given, made.driven),
+        )  # fmt: skip
+        made.add_flesh(state, workspace.geometry, self._flesh, near.pair[contact])
         return self.limits(made, q, 0.02 + 1.5 * time * np.abs(velocity))
+
+    def _place(self, moved: Mapping[str, pin.SE3]) -> None:
+        """See things where they are: those that moved by themselves since, and those that are moved."""
+        engine, now = self._engine, dict(moved)
+        if engine is not None:
+            bodies, free = engine.state.bodies, len(self._bodies)
+            where = np.hstack([bodies.position[:free], bodies.rotation[:free].reshape(-1, 9)])
+            for k in np.flatnonzero((where != self._where).any(axis=1)).tolist():
+                now[self._bodies[k]] = engine.placement(self._bodies[k])
+            self._where = where
+        self._workspace.place(now)
 
     def limits(self, points: Points, q: Array, reach: Array) -> Points:
         """Points and the limits within reaches (nv,) at a posture (nq,)."""
         return points.with_limits(self._model, self._limited, q, reach)
 
+    def joints(self, q: Array) -> Array:
+        """Placements (joints, 4, 3) of the joints at a posture (nq,), see `State.joints`."""
+        return np.array(self._workspace.state.at(q).joints)
+
+    def turned(self, before: Array, after: Array) -> float:
+        """By how much any piece of the figure turns between placements (joints, 4, 3) of the joints, radians."""
+        ends = (placed[self._carrying, :3] for placed in (before, after))
+        cosine = 0.5 * (np.einsum("kij,kij->k", *ends) - 1.0)
+        return float(np.arccos(np.clip(cosine.min(initial=1.0), -1.0, 1.0)))
+
     def _twists(self, q: Array, velocity: Array) -> Array:
         """Twists (pieces, 6) at the origin of the pieces, those of things zero."""
-        state = self._workspace.state.update(q)
+        state = self._workspace.state.at(q)
         twists: Array = ((state.support * state.spread(velocity)) @ state.columns)[self._workspace.table.joint]
         return twists
 
