@@ -253,8 +253,8 @@ class Articulated:
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
         if not hit.any():
             return np.zeros((len(target), 3))
-        impulse = self._solved(inertia, points, speed, target)[0]
-        self._give(inertia, points, impulse)
+        impulse, _, change = self._solved(inertia, points, speed, target)
+        self._give(points, impulse, change)
         return impulse
 
     def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Points, Array, Array]:
@@ -270,15 +270,14 @@ class Articulated:
             # m/s: to a tolerance, so that the engine meets what ends at a contact after the step; at most
             target = np.where(room >= 0.0, 1e-6 - room / time, np.minimum(1e-6 - room / time, 0.5))
             speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
-            found, after = self._solved(inertia, points, speed, target, found)
-            # impulses turn joints towards limits that were far away
-            ahead = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ found.ravel())
+            found, after, change = self._solved(inertia, points, speed, target, found)
+            ahead = self.velocity + change  # impulses turn joints towards limits that were far away
             reach = np.full(len(ahead), np.inf) if again == 2 else time * np.abs(ahead)
             count, points = len(found), self._touching.limits(points, self.q, reach)
             if len(points.gap) == count:
                 break
             found = np.vstack([found, np.zeros((len(points.gap) - count, 3))])
-        self._give(inertia, points, found)
+        self._give(points, found, change)
         bearing, self.points = np.flatnonzero(found[:, 0] > 0.0), len(found)
         world = np.einsum("cr,crk->ck", found[bearing], points.axes[bearing])
         self._old = Impulses(points.pair[bearing], points.place[bearing], world, np.zeros((0, 3)), time)
@@ -286,27 +285,41 @@ class Articulated:
 
     def _solved(
         self, inertia: Array, points: Points, speed: Array, target: Array, start: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Impulses (m, 3) of least normal velocities from others, and these (3 m,); without a start, those of blows."""
-        impulse, velocities, kept = np.zeros((len(target), 3)), speed.copy(), np.flatnonzero(target > -np.inf)
-        if not len(kept):
-            return impulse, velocities
-        rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        begun, mobility = speed[rows], impulse_kernel.mobilities(inertia, points.figure[rows])
-        impulse_kernel.add_bodies(mobility, points.things[rows], points.responses)
-        begin = None if start is None else start[kept]
-        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin)
-        flat = found.ravel()
-        gain = float(flat @ (begun + after))
-        if start is None and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less
-            found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
-            after = begun + mobility @ found.ravel()
-        impulse[kept], velocities[rows] = found, after
-        return impulse, velocities
+    ) -> tuple[Array, Array, Array]:
+        """Impulses (m, 3) of least normal velocities from others, these (3 m,), and what they change of the joints'.
 
-    def _give(self, inertia: Array, points: Points, impulse: Array) -> None:
-        """Give impulses (m, 3) to the joints and to the things."""
-        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ impulse.ravel())
+        Without a start they are those of blows. Points that part fast are in the program if its impulses stop that.
+        """
+        impulse, velocities, change = np.zeros((len(target), 3)), speed.copy(), np.zeros(len(inertia))
+        kept = (target > -np.inf) & (speed[::3] < target + 0.3)  # m/s
+        kept |= False if start is None else start[:, 0] > 0.0
+        while len(chosen := np.flatnonzero(kept)):
+            rows = (3 * chosen[:, None] + np.arange(3)).ravel()
+            begun, mobility = speed[rows], impulse_kernel.mobilities(inertia, points.figure[rows])
+            impulse_kernel.add_bodies(mobility, points.things[rows], points.responses)
+            begin = None if start is None else start[chosen]
+            found, after = impulse_kernel.impulses(mobility, begun, points.friction[chosen], target[chosen], begin)
+            flat = found.ravel()
+            gain = float(flat @ (begun + after))
+            if (
+                start is None and gain > 0.0
+            ):  # as friction can where it is coupled with the normal: then less
+                found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+                flat, after = found.ravel(), begun + mobility @ found.ravel()
+            impulse[chosen] = found
+            change = impulse_kernel.by_inertia(inertia, points.figure[rows].T @ flat)
+            pushed = np.einsum("bij,bj->bi", points.responses, (points.things[rows].T @ flat).reshape(-1, 6))
+            velocities = speed + points.figure @ change + points.things @ pushed.ravel()
+            velocities[rows] = after
+            more = (target > -np.inf) & ~kept & (velocities[::3] < target - 1e-6)
+            if not more.any():
+                break
+            kept, start = kept | more, None if start is None else impulse
+        return impulse, velocities, change
+
+    def _give(self, points: Points, impulse: Array, change: Array) -> None:
+        """Give impulses (m, 3), which change the velocity by (nv,), to the joints and to the things."""
+        self.velocity = self.velocity + change
         for name, wrench in zip(points.bodies, (points.things.T @ impulse.ravel()).reshape(-1, 6), strict=True):
             if wrench.any():
                 self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]

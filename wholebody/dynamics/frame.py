@@ -183,3 +183,11 @@ def _two_placements(pair: object, name: str) -> tuple[pin.SE3, pin.SE3]:
         )
     before, after = (placement(one, f"kinematic: {name}") for one in pair)
     return before, after
+
+
+def bounded(value: object, most: float, what: str, count: int = 3) -> Array:
+    """So many numbers, none of them beyond `most`."""
+    numbers = np.array(checks.numbers(value, (count,), what))
+    if np.abs(numbers).max() > most:
+        raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
+    return numbers

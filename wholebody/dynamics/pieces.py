@@ -259,6 +259,7 @@ class ContactFinder:
         # normals within 0.1 rad are the same: coal's are off by some 0.02 rad where pieces are 50 um apart
         self._rows = ContactRowBuilder(pieces.table, 6, 0.995)
         compiled_kernel()  # not in the middle of a motion
+        self._last: tuple[Contacts, ContactPoints] | None = None  # of the last question
         self._bodies = pieces.body[pieces.table.pairs]
 
     def near(self, position: Array, rotation: Array, margin: Array, active: Mask) -> Contacts:
@@ -273,6 +274,8 @@ class ContactFinder:
 
     def points(self, contacts: Contacts) -> ContactPoints:
         """Contact points of near pairs; the normals in `contacts` become those of faces where they are meant."""
+        if self._last is not None and self._last[0] is contacts:
+            return self._last[1]
         rows = self._rows.rows(contacts)
         owner = rows.contact
         normal = rows.wrench[:, :3].copy()
@@ -280,7 +283,8 @@ class ContactFinder:
         kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `step_program.TOUCH`
         owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]
-        return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])
+        self._last = contacts, ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])
+        return self._last[1]
 
 
 @compiled()
