@@ -21,7 +21,7 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState, Joints
-from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, bounded, given_placements
+from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, Given, bounded, given_placements
 from wholebody.dynamics.passing import StepStart, free_between
 from wholebody.dynamics.pieces import ContactFinder, ContactPoints, Pieces
 from wholebody.dynamics.sleeping import Sleepers
@@ -186,7 +186,7 @@ class RigidBodies:
     def advance(
         self,
         dt: float,
-        kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None,
+        kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | Given | None = None,
         borne: Collection[str] = (),
         yielding: Collection[str] = (),
         until: float = np.inf,
