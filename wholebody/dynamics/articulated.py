@@ -301,9 +301,7 @@ class Articulated:
             found, after = impulse_kernel.impulses(mobility, begun, points.friction[chosen], target[chosen], begin)
             flat = found.ravel()
             gain = float(flat @ (begun + after))
-            if (
-                start is None and gain > 0.0
-            ):  # as friction can where it is coupled with the normal: then less
+            if start is None and gain > 0.0:  # as friction can where it is coupled with the normal: then less
                 found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
                 flat, after = found.ravel(), begun + mobility @ found.ravel()
             impulse[chosen] = found
