@@ -24,15 +24,14 @@ from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.blows import BOUNCE, left_for_later
-from wholebody.dynamics.coupling import Actuated, Moved, Points, approaches, axes_of, drift, torques, turned
-from wholebody.dynamics.frame import EngineFrame, impacts
+from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques
+from wholebody.dynamics.frame import EngineFrame, Given, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
-from wholebody.dynamics.pieces import Surfaces, places
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
+from wholebody.dynamics.sleeping import AFTER, STILL
 from wholebody.dynamics.step_program import SKIN, Impulses
+from wholebody.dynamics.touching import Touching
 from wholebody.figures.state import free_roots
-from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
-from wholebody.geometry.flesh import flesh_of
 from wholebody.scene.scene import Scene
 
 LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
@@ -61,35 +60,32 @@ class Articulated:
         self._gravity = np.array(GRAVITY if engine is None else engine.gravity) if gravity is None else gravity
         self._model.gravity.linear = self._gravity
         self._data, self._workspace = self._model.createData(), scene.workspace()
-        self._rows = ContactRowBuilder(self._workspace.table, 4, 0.995)
-        owners = self._workspace.owners
-        self._names = list(dict.fromkeys((*(() if engine is None else engine.names), *owners)))  # the engine's first
-        number = {name: k for k, name in enumerate(self._names)}
-        self._owners: Indices = np.array([number[name] for name in owners], dtype=np.intp)
-        free = self._owners < (0 if engine is None else len(engine.bodies))
+        self._touching = Touching(scene, self._workspace, self._model, engine)
         # m: most distances of pairs that a step may lead into each other; the engine looks at the others
-        self._own_pairs = np.where(free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
+        self._own_pairs = np.where(self._touching.free[self._workspace.table.pairs].any(axis=1), -np.inf, 1e-3)
         self._sag = np.zeros(2 * self._model.nv + len(self._own_pairs) + 1)  # m/s2: by limit, pair; the last for others
-        self._old, self._flesh = Impulses.nothing(0), flesh_of(scene.geometry)
+        self._old = Impulses.nothing(0)
         self.velocity, self.impulses, self.points = np.zeros(self._model.nv), dict[str, Array](), 0
         self.frames, self.ends = list[EngineFrame](), list[float]()
-        self._tracked, self._surfaces = self.q, Surfaces(scene, self._names)
-        self._turning, self._asked, self._masses = 0.0, b"", np.zeros((0, 0))  # rad/s
+        self._tracked, self._asked, self._masses = self.q, b"", np.zeros((0, 0))
+        self._turned, self._turning = 0.0, 0.0  # rad in the last step, rad/s
+        self._seats: tuple[Mapping[str, int], Indices, Array] | None = None  # of segments in their joints
+        self._slow_for, self._beside = 0.0, list[str]()  # s; bodies that the last step was about
         own = pin.crba(self._model, self._data, self.q).diagonal()
         light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
         self._model.armature += np.where(light, 1e-5, 1e-3 * own * aligning(self._model))
         self.stiffness, self.damping = actuated.gains(self._inertia(self.q).diagonal())
-        single = [(one.idx_q, one.idx_v) for one in self._model.joints[1:] if one.nq == one.nv == 1]  # [0]: the world
         driven = (self.stiffness > 0.0) | (self.damping > 0.0)
+        self._driven = bool(driven.any())
         freedoms = {k: np.arange(6) + self._model.idx_vs[k] for k in free_roots(self._model)}
         self._roots = [k for k in freedoms if not driven[freedoms[k]].any()]
         self._adrift: Indices = np.concatenate([np.zeros(0, dtype=np.intp), *(freedoms[k] for k in self._roots)])
-        self._limited: Indices = np.array(single, dtype=np.intp).reshape(-1, 2)
         impulse_kernel.compiled_kernel()
-        compiled_kernel()
 
     def advance(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> None:
         """Go on by a frame, towards the tracked posture (nq,) at its end; the things go on with it."""
+        if self._rests(tracked, dt, moved, segments):
+            return
         steady = pin.difference(self._model, self._tracked, tracked) / dt
         # so often steps may be made again to end at an impact, or end early: what is squeezed meets thousands
         now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
@@ -102,6 +98,27 @@ class Articulated:
             now, left = now + step, left - step
             self.ends.append(now)
         self._tracked = np.array(tracked)
+        slow = np.abs(self.velocity).max(initial=0.0) < 1.0 and self._touching.fastest(self.q, self.velocity) < STILL
+        self._slow_for = self._slow_for + dt if slow else 0.0
+
+    def _rests(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> bool:
+        """Whether the figure lies still for a frame, as what lies beside it does, and nothing hits it; then it is over.
+
+        What is free of contacts and springs drifts on, however slow it is.
+        """
+        engine, pulled = self._engine, self._driven and bool((tracked != self._tracked).any())
+        floats = len(self._roots) > 0 and not len(self._old.pair)
+        if self._slow_for < AFTER or moved or pulled or floats or self._touching.awake(self._beside):
+            return False
+        back = None if engine is None else engine.way_back()
+        frame = None if engine is None else engine.advance(dt, yielding=segments)
+        if back is not None and frame is not None and not segments.keys().isdisjoint(frame.wrenches):
+            back()
+            self._slow_for = 0.0
+            return False
+        self.velocity = np.zeros_like(self.velocity)  # its impulses go on as in the frame before
+        self.frames, self.ends = [] if frame is None else [frame], [dt]
+        return True
 
     def energy(self) -> float:
         """Kinetic and potential energy, joules."""
@@ -131,7 +148,7 @@ class Articulated:
         while True:
             done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
-            angle = turned(self._workspace, figure[0], self.q)
+            angle = self._turned
             far = angle > FAR or sunk
             if far and done > STEP:
                 most = STEP
@@ -152,7 +169,8 @@ class Articulated:
     ) -> tuple[float, EngineFrame | None, bool]:
         """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
-        points, began, start = self._points(planned, moved), self.energy(), self.velocity.copy()
+        began, start, stood = self.energy(), self.velocity, self._touching.joints(self.q)
+        points = self._touching.points(self.q, start, planned, moved)
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
         time = self._until_impact(points, min(time, STEP) if points.bodies else time)
@@ -160,6 +178,7 @@ class Articulated:
         springs = Springs(self.stiffness, self.damping, apart, steady)
         driven, self.velocity, mean, borne = free_motion(model, self._data, self._inertia, self.q, begin, time, springs)
         points, bearing, parting = self._bear(driven, points, time)
+        self._beside = points.bodies
         blow = np.vstack([blow, np.zeros((len(bearing) - len(blow), 3))])
         impulse, after, pressed = blow + bearing, self.velocity, bool(bearing.any())
         pin.centerOfMass(model, self._data, self.q)
@@ -177,24 +196,26 @@ class Articulated:
         # what parts an overlap has its energy from nowhere
         work -= np.maximum(0.0, (bearing * parting.reshape(-1, 3)).sum(axis=1))
         paid = float(motor @ moves + work[points.driven].sum())
-        motions = self._move(moves, segments, drifted, np.inf if self.stiffness.any() else began + paid)
-        motions |= {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
+        self._move(moves, drifted, np.inf if self.stiffness.any() else began + paid)
+        stands = self._touching.joints(self.q)
+        self._turned = self._touching.turned(stood, stands)
+        motions = {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
         again = time > SHORTEST and self._stops > 0
         ended = points.gap + points.figure[::3] @ moves + time * points.given[::3]
-        if self._sunk(points, ended, time, {name: motions[name][1] for name in moved}) and again:
+        if self._sunk(points, ended, time, {name: way[1] for name, way in motions.items()}) and again:
             return time, None, True
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
         self._settle(began + paid, most, [momentum for momentum, _ in drifted])
         if engine is None:
             return time, None, False
-        held = points.held(bearing)
+        held, places = points.held(bearing), self._carried(segments, stood, stands)
         before = engine.energy(), self.energy()
-        frame = engine.advance(time, motions, held, segments, BOUNCE if again else np.inf)
+        frame = engine.advance(time, places.and_others(motions), held, segments, BOUNCE if again else np.inf)
         given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
         if not again and left_for_later(engine, frame, given, before, lambda some: self._reacted(some, segments)[1]):
             paid = sum(before) - engine.energy()
         else:
-            ways = {name: pin.log6(motions[name][1] * motions[name][0].inverse()).vector for name in given}
+            ways = {name: places.way(name) for name in given}
             paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
         self._react(given, paid, segments)
         return time, frame, False
@@ -202,60 +223,10 @@ class Articulated:
     def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
         """Whether a step of points that sought gaps (m,) led deeper into what the engine does not keep apart."""
         self._workspace.place(moved)
-        near = self._workspace.near(self.q, 1e-3, self._own_pairs)
+        near = self._workspace.proximity.query(self._workspace.state.at(self.q).data, 1e-3, self._own_pairs)
         self._sag = points.sag(ended, near, time, len(self._sag))
         began = points.gap[points.pair >= 2 * self._model.nv].min(initial=0.0)
         return bool(near.distance.min(initial=0.0) < min(-1e-4, began))  # m
-
-    def _points(self, time: float, moved: Moved) -> Points:
-        """What the figure can touch within a time, and the joint limits that it can reach."""
-        workspace, engine, model = self._workspace, self._engine, self._model
-        free = {} if engine is None else {name: engine.placement(name) for name in engine.bodies}
-        workspace.place({**free, **{name: way[0] for name, way in moved.items()}})
-        twists = np.zeros((len(self._names), 6))  # at the origin, of what is moved
-        for name, (before, after) in moved.items():
-            twists[self._names.index(name)] = pin.log6(after * before.inverse()).vector / time
-        speed = self._approach(twists)
-        # m: what is hit in this step can be faster after it
-        most = 2e-3 + np.minimum(0.2, time * (1.5 * speed + 0.5 * min(float(speed.max(initial=0.0)), 10.0)))
-        near = workspace.near(self.q, float(most.max(initial=0.0)), most)
-        rows = self._rows.rows(near)
-        kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
-        contact, wrench, met = rows.contact[kept], rows.wrench[kept], len(kept)
-        normal, place = wrench[:, :3], places(wrench, near, contact)
-        owner, gap, pair = self._owners[near.pair[contact]], rows.gap[kept], near.number[contact]
-        if engine is not None and (touched := np.unique(owner[owner < len(free)])).size:
-            others = engine.contacts([self._names[k] for k in touched.tolist()])
-            owner, gap = np.concatenate([owner, others.bodies]), np.concatenate([gap, np.maximum(others.gap, SKIN)])
-            normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
-            pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
-        bodies = np.unique(owner[owner < len(free)])
-        made = Points.room(len(owner), model.nv, [self._names[k] for k in bodies.tolist()], engine)
-        made.axes[:], made.place[:], made.gap[:] = axes_of(normal), place, gap
-        directions = np.concatenate([made.axes, cross(place[:, None], made.axes)], axis=2)
-        joints = (np.repeat(side[kept], 3) for side in (rows.second, rows.first))
-        made.figure[: 3 * met] = workspace.state.rows(directions[:met].reshape(-1, 6), *joints)
-        made.add_flesh(workspace.state, workspace.geometry, self._flesh, near.pair[contact])
-        made.restitution[:], made.friction[:] = self._surfaces(owner)
-        slot: Indices = np.full(len(self._names), -1, dtype=np.intp)
-        slot[bodies] = np.arange(len(bodies))
-        centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
-        made.add_things(owner, slot, centres, twists, directions)
-        made.pair[:] = 2 * model.nv + pair  # after the limits
-        return made.with_limits(model, self._limited, self.q, 0.02 + 1.5 * time * np.abs(self.velocity))
-
-    def _approach(self, moved: Array) -> Array:
-        """How fast the pieces of every pair can approach each other (pairs,), m/s; `moved` (n, 6): see `_points`."""
-        workspace, twists = self._workspace, moved
-        state = workspace.state.update(self.q)
-        twist = ((state.support * state.spread(self.velocity)) @ state.columns)[workspace.table.joint]
-        if self._engine is not None:
-            bodies, free = self._engine.state.bodies, len(self._engine.bodies)
-            own = bodies.twist[:free]
-            twists = moved.copy()
-            twists[:free] = np.hstack([own[:, :3] + cross(bodies.position[:free], own[:, 3:]), own[:, 3:]])
-        twist = twist + twists[self._owners]
-        return approaches(workspace.table, workspace.proximity.place(state.data)[:, 3], twist)
 
     def _relative(self, points: Points) -> Array:
         """Velocities (3 m,) at the points along their axes, m/s."""
@@ -282,8 +253,8 @@ class Articulated:
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
         if not hit.any():
             return np.zeros((len(target), 3))
-        impulse = self._solved(inertia, points, speed, target)[0]
-        self._give(inertia, points, impulse)
+        impulse, _, change = self._solved(inertia, points, speed, target)
+        self._give(points, impulse, change)
         return impulse
 
     def _bear(self, inertia: Array, points: Points, time: float) -> tuple[Points, Array, Array]:
@@ -296,17 +267,17 @@ class Articulated:
         for again in range(4):
             sag = self._sag[np.minimum(points.pair, len(self._sag) - 1)]
             room = points.gap + time**2 * sag - SKIN  # a step removes an overlap
-            target = np.where(room >= 0.0, -room / time, np.minimum(-room / time, 0.5))  # m/s, at most
+            # m/s: to a tolerance, so that the engine meets what ends at a contact after the step; at most
+            target = np.where(room >= 0.0, 1e-6 - room / time, np.minimum(1e-6 - room / time, 0.5))
             speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
-            found, after = self._solved(inertia, points, speed, target, found)
-            # impulses turn joints towards limits that were far away
-            ahead = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ found.ravel())
+            found, after, change = self._solved(inertia, points, speed, target, found)
+            ahead = self.velocity + change  # impulses turn joints towards limits that were far away
             reach = np.full(len(ahead), np.inf) if again == 2 else time * np.abs(ahead)
-            count, points = len(found), points.with_limits(self._model, self._limited, self.q, reach)
+            count, points = len(found), self._touching.limits(points, self.q, reach)
             if len(points.gap) == count:
                 break
             found = np.vstack([found, np.zeros((len(points.gap) - count, 3))])
-        self._give(inertia, points, found)
+        self._give(points, found, change)
         bearing, self.points = np.flatnonzero(found[:, 0] > 0.0), len(found)
         world = np.einsum("cr,crk->ck", found[bearing], points.axes[bearing])
         self._old = Impulses(points.pair[bearing], points.place[bearing], world, np.zeros((0, 3)), time)
@@ -314,37 +285,47 @@ class Articulated:
 
     def _solved(
         self, inertia: Array, points: Points, speed: Array, target: Array, start: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Impulses (m, 3) of least normal velocities from others, and these (3 m,); without a start, those of blows."""
-        impulse, velocities, kept = np.zeros((len(target), 3)), speed.copy(), np.flatnonzero(target > -np.inf)
-        if not len(kept):
-            return impulse, velocities
-        rows = (3 * kept[:, None] + np.arange(3)).ravel()
-        begun, mobility = speed[rows], impulse_kernel.mobilities(inertia, points.figure[rows])
-        impulse_kernel.add_bodies(mobility, points.things[rows], points.responses)
-        begin = None if start is None else start[kept]
-        found, after = impulse_kernel.impulses(mobility, begun, points.friction[kept], target[kept], begin)
-        flat = found.ravel()
-        gain = float(flat @ (begun + after))
-        if start is None and gain > 0.0:  # as friction can where its direction is coupled with the normal: then less
-            found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
-            after = begun + mobility @ found.ravel()
-        impulse[kept], velocities[rows] = found, after
-        return impulse, velocities
+    ) -> tuple[Array, Array, Array]:
+        """Impulses (m, 3) of least normal velocities from others, these (3 m,), and what they change of the joints'.
 
-    def _give(self, inertia: Array, points: Points, impulse: Array) -> None:
-        """Give impulses (m, 3) to the joints and to the things."""
-        self.velocity = self.velocity + impulse_kernel.by_inertia(inertia, points.figure.T @ impulse.ravel())
+        Without a start they are those of blows. Points that part fast are in the program if its impulses stop that.
+        """
+        impulse, velocities, change = np.zeros((len(target), 3)), speed.copy(), np.zeros(len(inertia))
+        kept = (target > -np.inf) & (speed[::3] < target + 0.3)  # m/s
+        kept |= False if start is None else start[:, 0] > 0.0
+        while len(chosen := np.flatnonzero(kept)):
+            rows = (3 * chosen[:, None] + np.arange(3)).ravel()
+            begun, mobility = speed[rows], impulse_kernel.mobilities(inertia, points.figure[rows])
+            impulse_kernel.add_bodies(mobility, points.things[rows], points.responses)
+            begin = None if start is None else start[chosen]
+            found, after = impulse_kernel.impulses(mobility, begun, points.friction[chosen], target[chosen], begin)
+            flat = found.ravel()
+            gain = float(flat @ (begun + after))
+            if start is None and gain > 0.0:  # as friction can where it is coupled with the normal: then less
+                found = found * max(0.0, 1.0 - gain / float(flat @ mobility @ flat))
+                flat, after = found.ravel(), begun + mobility @ found.ravel()
+            impulse[chosen] = found
+            change = impulse_kernel.by_inertia(inertia, points.figure[rows].T @ flat)
+            pushed = np.einsum("bij,bj->bi", points.responses, (points.things[rows].T @ flat).reshape(-1, 6))
+            velocities = speed + points.figure @ change + points.things @ pushed.ravel()
+            velocities[rows] = after
+            more = (target > -np.inf) & ~kept & (velocities[::3] < target - 1e-6)
+            if not more.any():
+                break
+            kept, start = kept | more, None if start is None else impulse
+        return impulse, velocities, change
+
+    def _give(self, points: Points, impulse: Array, change: Array) -> None:
+        """Give impulses (m, 3), which change the velocity by (nv,), to the joints and to the things."""
+        self.velocity = self.velocity + change
         for name, wrench in zip(points.bodies, (points.things.T @ impulse.ravel()).reshape(-1, 6), strict=True):
             if wrench.any():
                 self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + wrench[:3]
 
-    def _move(
-        self, way: Array, segments: Mapping[str, int], drifted: Sequence[tuple[pin.Force, Array]], energy: float
-    ) -> dict[str, tuple[pin.SE3, pin.SE3]]:
-        """Move the joints by a way (nv,), and nothing above a potential energy [J]; the motions of the segments."""
-        model, data, before = self._model, self._data, self._placements(segments)
+    def _move(self, way: Array, drifted: Sequence[tuple[pin.Force, Array]], energy: float) -> None:
+        """Move the joints by a way (nv,), and nothing above a potential energy [J]."""
+        model, data = self._model, self._data
         start, lowest = self.q, self._potential()
         self.q = np.array(pin.integrate(model, start, way))
         pin.centerOfMass(model, data, self.q)
@@ -355,12 +336,19 @@ class Articulated:
         if rise > most:  # of so little, the rise is nearly proportional to the way
             part = 0.99 * most / rise * pin.difference(model, start, self.q)
             self.q = np.array(pin.integrate(model, start, part))
-        after = self._placements(segments)
-        return {name: (before[name], after[name]) for name in segments}
 
-    def _placements(self, segments: Mapping[str, int]) -> dict[str, pin.SE3]:
-        state = self._workspace.state.update(self.q)
-        return {name: pin.SE3(state.frame(number)) for name, number in segments.items()}
+    def _carried(self, segments: Mapping[str, int], before: Array, after: Array) -> Given:
+        """The motions of segments whose joints are at placements (joints, 4, 3) before and after."""
+        if self._seats is None or self._seats[0] is not segments:
+            frames = [self._model.frames[number] for number in segments.values()]
+            joints: Indices = np.array([frame.parentJoint for frame in frames], dtype=np.intp)
+            seats = np.array([frame.placement.homogeneous for frame in frames]).reshape(-1, 4, 4)
+            self._seats = segments, joints, seats
+        _, joints, seats = self._seats
+        placed = np.zeros((len(joints), 2, 4, 4))
+        placed[:, 0, :3], placed[:, 1, :3] = before[joints].transpose(0, 2, 1), after[joints].transpose(0, 2, 1)
+        placed[:, :, 3, 3] = 1.0
+        return Given(list(segments), placed @ seats[:, None])
 
     def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
         """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`."""

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, cross
-from wholebody.dynamics import rows_kernel, solve_kernel
+from wholebody.dynamics import motion_kernel, rows_kernel, solve_kernel
 from wholebody.dynamics.motion_kernel import Bodies
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.rows_kernel import JointPoints, Rows
@@ -55,7 +55,7 @@ class BodiesState:
         turns = turned[:, 1] @ turned[:, 0].transpose(0, 2, 1)
         bodies.rotation[numbers], bodies.position[numbers] = turned[:, 0], centres[:, 0]
         self.velocity[numbers] = (centres[:, 1] - centres[:, 0]) / time
-        self.spin[numbers] = np.array([pin.log3(turn) for turn in turns]).reshape(-1, 3) / time
+        self.spin[numbers] = rotation_vectors(turns) / time
         bodies.given[numbers] = bodies.twist[numbers].any(axis=1)
 
     def stop(self, numbers: Indices, at: Array) -> None:
@@ -89,10 +89,7 @@ class BodiesState:
         self.bodies.twist[bodies] *= np.sqrt(1.0 - energy / kinetic) if energy < kinetic else 0.0
 
     def _kinetic(self, bodies: Mask) -> float:
-        mass = self.pieces.mass[bodies]
-        local = np.einsum("bij,bi->bj", self.bodies.rotation[bodies], self.spin[bodies])
-        turning = np.einsum("bi,bij,bj->b", local, self.pieces.inertia[bodies], local)
-        return 0.5 * float((mass * (self.velocity[bodies] ** 2).sum(axis=1) + turning).sum())
+        return float(motion_kernel.kinetic(self.bodies, bodies))
 
     def momentum(self) -> Array:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,), of the same bodies."""
@@ -102,6 +99,17 @@ class BodiesState:
         local = np.einsum("bij,bi->bj", turned, self.spin[free])
         own = np.einsum("bij,bjk,bk->bi", turned, self.pieces.inertia[free], local)
         return np.concatenate([linear.sum(axis=0), (cross(self.bodies.position[free], linear) + own).sum(axis=0)])
+
+
+def rotation_vectors(turns: Array) -> Array:
+    """The rotation vectors (k, 3) of rotations (k, 3, 3)."""
+    sines = 0.5 * (turns[:, (2, 0, 1), (1, 2, 0)] - turns[:, (1, 2, 0), (2, 0, 1)])
+    sine, cosine = np.linalg.norm(sines, axis=1), 0.5 * (np.einsum("kii->k", turns) - 1.0)
+    small = sine < 1e-6  # rad: then the angle is its sine
+    found = sines * np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))[:, None]
+    for k in np.flatnonzero(cosine < -0.9):  # of nearly half a turn the sines are nearly nothing
+        found[k] = pin.log3(turns[k])
+    return np.asarray(found)
 
 
 class Joints:

@@ -27,6 +27,7 @@ from wholebody.base.arrays import Array, Indices, Mask, cross, with_values
 from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
+from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
@@ -34,7 +35,6 @@ from wholebody.geometry.flesh import Flesh, spreading
 from wholebody.geometry.pieces import ENDLESS
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.body import Surface
-from wholebody.scene.workspace import Workspace
 
 Gains = float | Mapping[str, float] | None
 MOST = 1e9  # N m/rad, N/m, N m s/rad, N s/m
@@ -271,27 +271,6 @@ class Points(NamedTuple):
             np.tile(np.eye(3), (count, 1, 1)), bodies, np.array(responses).reshape(-1, 6, 6),
         )  # fmt: skip
 
-    def add_things(self, owner: Indices, slot: Indices, centres: Array, twists: Array, directions: Array) -> None:
-        """Add what moves at the first k points.
-
-        Args:
-            owner: (k, 2) numbers of both bodies at a point.
-            slot: (n,) place of a body in `bodies`; -1 where it does not move by itself.
-            centres: (b, 3) centres of mass.
-            twists: (n, 6) at the origin, of what is moved; zero for others.
-            directions: (k, 3, 6) take a twist at the origin to velocities along the axes of each point.
-        """
-        things, given = self.things.reshape(len(self.gap), 3, len(self.bodies), 6), self.given.reshape(-1, 3)
-        moving: Mask = (slot >= 0) | twists.any(axis=1)
-        for side, sign in enumerate((-1.0, 1.0)):
-            whose = owner[:, side]
-            c = np.flatnonzero(slot[whose] >= 0)
-            b, axes = slot[whose[c]], directions[c, :, :3]
-            things[c, :, b, :3] = sign * axes
-            things[c, :, b, 3:] = sign * (directions[c, :, 3:] - cross(centres[b][:, None], axes))
-            given[: len(owner)] += sign * np.einsum("crk,ck->cr", directions, twists[whose])
-            self.driven[: len(owner)] |= moving[whose]
-
     def add_flesh(self, state: State, geometry: pin.GeometryModel, bent: Sequence[Flesh], pieces: Indices) -> None:
         """Add the motion of flesh beside its limb at the first points, whose pieces are (k, 2)."""
         for flesh in bent:
@@ -346,28 +325,10 @@ class Points(NamedTuple):
         return {self.bodies[b] for b in np.flatnonzero(acted).tolist()}
 
 
-def axes_of(normal: Array) -> Array:
-    """(m, 3, 3) normals (m, 3) and two tangents of each, one a row."""
-    first = cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([normal, first, cross(normal, first)], axis=1)
-
-
 def approaches(table: PairTable, centres: Array, twist: Array) -> Array:
     """Bounds (pairs,) [m/s] of the approach of pieces with `centres` (n, 3) and twists (n, 6) at the origin."""
-    first, second = table.pairs.T
-    smaller = np.where(table.reach[first] < table.reach[second], first, second)
-    relative = twist[first] - twist[second]
-    linear, spin = relative[:, :3] + cross(relative[:, 3:], centres[smaller]), relative[:, 3:]
-    reach = np.minimum(table.reach[smaller], ENDLESS)
-    return np.asarray(np.sqrt((linear**2).sum(axis=1)) + reach * np.sqrt((spin**2).sum(axis=1)))
-
-
-def turned(workspace: Workspace, before: Array, after: Array) -> float:
-    """By how much any piece of a figure turns between two postures (nq,), radians."""
-    placed = (workspace.proximity.place(workspace.state.update(q).data)[:, :3].copy() for q in (before, after))
-    cosine = 0.5 * (np.einsum("kij,kij->k", *placed) - 1.0)
-    return float(np.arccos(np.clip(cosine.min(initial=1.0), -1.0, 1.0)))
+    reach = np.minimum(table.reach, ENDLESS)
+    return np.asarray(impulse_kernel.approaches(table.pairs, reach, centres, twist))
 
 
 def torques(model: pin.Model, data: pin.Data, q: Array, wrenches: Sequence[tuple[int, Array]]) -> Array:

@@ -139,16 +139,37 @@ def one_frame(frames: Sequence[EngineFrame], ends: Sequence[float]) -> EngineFra
     )
 
 
-def given_placements(kinematic: object) -> tuple[list[str], Array]:
-    """What is moved in a frame, checked: its names, and the placements (k, 2, 4, 4) before and after."""
+class Given(NamedTuple):
+    """What is moved in a frame: its names, and the placements (k, 2, 4, 4) before and after."""
+
+    names: list[str]
+    placed: Array
+
+    def and_others(self, others: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> Given:
+        """These and others."""
+        if not others:
+            return self
+        placed = [[one.homogeneous for one in both] for both in others.values()]
+        return Given([*self.names, *others], np.concatenate([self.placed, placed]))
+
+    def way(self, name: str) -> Array:
+        """The twist (6,) at the world's origin by which one of them moves in a unit of time."""
+        before, after = (pin.SE3(one) for one in self.placed[self.names.index(name)])
+        return np.asarray(pin.log6(after * before.inverse()).vector)
+
+
+def given_placements(kinematic: object) -> Given:
+    """What is moved in a frame, checked."""
+    if isinstance(kinematic, Given):
+        return kinematic
     if kinematic is None:
-        return [], np.zeros((0, 2, 4, 4))
+        return Given([], np.zeros((0, 2, 4, 4)))
     given = checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
     pairs = [pair if _usual(pair) else _two_placements(pair, name) for name, pair in given.items()]
     placed = np.array([(before.homogeneous, after.homogeneous) for before, after in pairs]).reshape(-1, 2, 4, 4)
     if not np.isfinite(placed).all():
         placed = np.array([[one.homogeneous for one in _two_placements(pair, name)] for name, pair in given.items()])
-    return list(given), placed
+    return Given(list(given), placed)
 
 
 def _usual(pair: object) -> bool:
@@ -162,3 +183,11 @@ def _two_placements(pair: object, name: str) -> tuple[pin.SE3, pin.SE3]:
         )
     before, after = (placement(one, f"kinematic: {name}") for one in pair)
     return before, after
+
+
+def bounded(value: object, most: float, what: str, count: int = 3) -> Array:
+    """So many numbers, none of them beyond `most`."""
+    numbers = np.array(checks.numbers(value, (count,), what))
+    if np.abs(numbers).max() > most:
+        raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
+    return numbers

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled, with_loops
 from wholebody.base.dense_kernel import factorise, gram, substitute
 from wholebody.dynamics.solve_kernel import FAST, along_way
 
 OVER = 1.6  # over-relaxation of the alternating direction method; 1.5 to 1.8 is usual (Boyd et al., 2011)
-COARSE = 1e-3  # m/s: what sweeps leave further from the laws of contact is refined
+COARSE = 2e-4  # m/s: what sweeps leave further from the laws of contact is refined
 
 
 @compiled(error_model="numpy", fastmath=FAST)
@@ -266,42 +266,132 @@ def impulses(
     With those of the step before as a `start`, 1e-6 m/s is exact enough, and the next step goes on from there.
     """
     velocity, impulse = speed.copy(), np.zeros((len(friction), 3)) if start is None else start.copy()
-    most, tolerance = (1000, 1e-7) if start is None else (500, 1e-6)
+    most, tolerance = (1000, 1e-7) if start is None else (60, 1e-6)
     solve(mobility, velocity, (friction, target), impulse, most, tolerance)
     if violation(mobility, velocity, friction, target, impulse) > COARSE:
-        impulse = _refined(mobility, speed, friction, target, impulse)
+        impulse = _refined(mobility, velocity, friction, target, impulse)
         velocity = speed + mobility @ impulse.ravel()
     return impulse, velocity
 
 
-def _refined(mobility: Array, speed: Array, friction: Array, target: Array, impulse: Array) -> Array:
-    """The impulses (m, 3) of `solve`, or of the alternating direction method where they are nearer."""
-    # sweeps pass on a thousandth of an impulse where much rests on little; this method factors the matrix
-    rest = speed.copy()
-    rest[::3] -= target
-    own = np.maximum(mobility.diagonal().reshape(-1, 3), 1e-9)
+def _refined(mobility: Array, velocity: Array, friction: Array, target: Array, impulse: Array) -> Array:
+    """Impulses (m, 3) nearer to the laws of contact than those of `solve`, with which the velocities are (3 m,).
+
+    Sweeps pass on a thousandth of an impulse where much rests on little; this method factors the matrix of the points
+    that bear or approach, and begins where the sweeps ended.
+    """
+    best, least, share = impulse, violation(mobility, velocity, friction, target, impulse), 1e-2
+    speed, own = velocity - mobility @ impulse.ravel(), np.maximum(mobility.diagonal().reshape(-1, 3), 1e-9)
     own[:, 1:] = own[:, 1:].max(axis=1)[:, None]
-    now, dual, share = np.zeros_like(rest), -rest, 1e-3
-    best, least = impulse, violation(mobility, speed + mobility @ impulse.ravel(), friction, target, impulse)
-    for _ in range(8):  # of 50 steps
-        weight = share * own.ravel()
-        broken, moved = _split(mobility, weight, rest, friction, now, dual, 50)
-        off = violation(mobility, speed + mobility @ now, friction, target, now.reshape(-1, 3))
-        if off < least:
-            best, least = now.reshape(-1, 3).copy(), off
-        if off < 0.1 * COARSE:
-            break
-        ratio = broken / max(share * moved, 1e-300)
-        if not 0.2 < ratio < 5.0:
-            share = min(max(share * min(max(np.sqrt(ratio), 1e-3), 1e3), 1e-6), 1e6)
+    for _ in range(3):  # each with the points that approached after the one before
+        chosen = np.flatnonzero((impulse[:, 0] > 0.0) | (velocity[::3] < target + 1e-6))
+        rows = (3 * chosen[:, None] + np.arange(3)).ravel()
+        among, rest, dual = mobility[np.ix_(rows, rows)], speed[rows], -velocity[rows]
+        rest[::3] -= target[chosen]
+        dual[::3] += target[chosen]
+        now, rough, impulse = impulse[chosen].ravel(), friction[chosen], np.zeros_like(impulse)
+        for _ in range(8):  # of 20 steps
+            broken, moved = _split(among, share * own[chosen].ravel(), rest, rough, now, dual, 20)
+            impulse[chosen] = now.reshape(-1, 3)
+            velocity = speed + now @ mobility[rows]
+            off = violation(mobility, velocity, friction, target, impulse)
+            if off < least:
+                best, least = impulse.copy(), off
+            if off < COARSE:
+                return best
+            ratio = broken / max(share * moved, 1e-300)
+            if not 0.2 < ratio < 5.0:
+                share = min(max(share * min(max(np.sqrt(ratio), 1e-3), 1e3), 1e-6), 1e6)
     return best
+
+
+@compiled(error_model="numpy", fastmath=FAST)
+def approaches(pairs: Indices, reach: Array, centres: Array, twist: Array) -> Array:
+    """Bounds (pairs,) [m/s] of the approach of pieces; arguments as of `touching.approaches`, with its least reach."""
+    found = np.empty(len(pairs))
+    for number in range(len(pairs)):
+        p, q = pairs[number, 0], pairs[number, 1]
+        piece = p if reach[p] < reach[q] else q
+        speed, spin = 0.0, 0.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            one, other = twist[p, 3 + i] - twist[q, 3 + i], twist[p, 3 + j] - twist[q, 3 + j]
+            speed += (twist[p, k] - twist[q, k] + one * centres[piece, j] - other * centres[piece, i]) ** 2
+            spin += one**2
+        found[number] = np.sqrt(speed) + reach[piece] * np.sqrt(spin)
+    return found
+
+
+@compiled(error_model="numpy", fastmath=FAST)
+def point_rows(
+    points: tuple[Array, Array, Indices],
+    joints: tuple[Indices, Array, Array],
+    bodies: tuple[Indices, Array, Array],
+    found: tuple[Array, Array, Array, Array, Mask],
+) -> None:
+    """Write axes and velocities of points, of which those of the figure come first.
+
+    Args:
+        points: normals and places (m, 3), and the numbers (m, 2) of both bodies.
+        joints: the joints (k, 2) of the figure's points, support (joints, nv) and jacobian (6, nv) as in `State`.
+        bodies: the place (n,) of each body among those that move by themselves, -1 for others; centres of mass (b, 3)
+            of those; twists (n, 6) at the origin, of what is moved, zero for others.
+        found: `axes`, `figure`, `things`, `given` and `driven` as in `coupling.Points`, all zero.
+    """
+    (normal, place, owner), (joint, support, jacobian), (slot, centres, twists) = points, joints, bodies
+    axes, figure, things, given, driven = found
+    for c in range(len(normal)):
+        least = 0
+        for k in range(1, 3):
+            if abs(normal[c, k]) < abs(normal[c, least]):
+                least = k
+        i, j = (least + 1) % 3, (least + 2) % 3
+        size = np.sqrt(normal[c, i] ** 2 + normal[c, j] ** 2)
+        # normal x e, of the axis e that is nearest to a right angle with it
+        axes[c, 1, least], axes[c, 1, i], axes[c, 1, j] = 0.0, normal[c, j] / size, -normal[c, i] / size
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            axes[c, 0, k] = normal[c, k]
+            axes[c, 2, k] = normal[c, i] * axes[c, 1, j] - normal[c, j] * axes[c, 1, i]
+        for r in range(3):
+            row, axis = 3 * c + r, axes[c, r]
+            turn = (
+                place[c, 1] * axis[2] - place[c, 2] * axis[1],
+                place[c, 2] * axis[0] - place[c, 0] * axis[2],
+                place[c, 0] * axis[1] - place[c, 1] * axis[0],
+            )
+            for n in range(figure.shape[1] if c < len(joint) else 0):
+                share = support[joint[c, 1], n] - support[joint[c, 0], n]
+                if share != 0.0:
+                    total = 0.0
+                    for k in range(3):
+                        total += axis[k] * jacobian[k, n] + turn[k] * jacobian[3 + k, n]
+                    figure[row, n] = share * total
+            for side in range(2):
+                body, sign = owner[c, side], 2.0 * side - 1.0
+                b = slot[body]
+                for k in range(3):
+                    rate = axis[k] * twists[body, k] + turn[k] * twists[body, 3 + k]
+                    given[row] += sign * rate
+                    if twists[body, k] != 0.0 or twists[body, 3 + k] != 0.0 or b >= 0:
+                        driven[c] = True
+                    if b >= 0:
+                        i, j = (k + 1) % 3, (k + 2) % 3
+                        things[row, 6 * b + k] = sign * axis[k]
+                        lever = centres[b, i] * axis[j] - centres[b, j] * axis[i]
+                        things[row, 6 * b + 3 + k] = sign * (turn[k] - lever)
 
 
 @with_loops(__name__)
 def compiled_kernel(_: Any) -> None:
     """The loop."""
     eye, three, one = np.eye(3), np.zeros(3), np.zeros(1)
+    none, pairs, rows = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp), np.zeros((0, 3))
     mobilities(eye, eye)
+    approaches(pairs, one, rows, np.zeros((0, 6)))
+    axes, flags = np.zeros((0, 3, 3)), np.zeros(0, dtype=bool)
+    moved = none, rows, np.zeros((0, 6))
+    point_rows((rows, rows, pairs), (pairs, eye, np.zeros((6, 3))), moved, (axes, rows, rows, np.zeros(0), flags))
     _by_cholesky(eye, three)
     add_bodies(eye, np.zeros((3, 6)), np.zeros((1, 6, 6)))
     solve(eye, three, (one, one), np.zeros((1, 3)), 1, 1e-9)

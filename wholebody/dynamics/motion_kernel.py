@@ -175,6 +175,32 @@ def _copy(source: Array, target: Array) -> None:
 
 
 @compiled()
+def kinetic(bodies: Bodies, chosen: Mask) -> float:
+    """Kinetic energy of the chosen bodies (n,), joules."""
+    total, momentum = 0.0, np.empty(3)
+    for b in range(len(chosen)):
+        if chosen[b]:
+            angular_momentum(bodies.rotation[b], bodies.inertia[b], bodies.twist[b, 3:], momentum)
+            for k in range(3):
+                total += bodies.mass[b] * bodies.twist[b, k] ** 2 + momentum[k] * bodies.twist[b, 3 + k]
+    return 0.5 * total
+
+
+@compiled()
+def travel(bodies: Bodies, lever: Array, gravity: Array, time: float) -> Array:
+    """Most that a point of each body, its lever (n,) [m] from the centre of mass at most, moves in a time, metres."""
+    found = np.empty(len(lever))
+    fall = np.sqrt(gravity[0] ** 2 + gravity[1] ** 2 + gravity[2] ** 2) * time
+    for b in range(len(lever)):
+        speed, spin = 0.0, 0.0
+        for k in range(3):
+            speed += bodies.twist[b, k] ** 2
+            spin += bodies.twist[b, 3 + k] ** 2
+        found[b] = (np.sqrt(speed) + np.sqrt(spin) * lever[b] + (fall if bodies.moving[b] else 0.0)) * time
+    return found
+
+
+@compiled()
 def displace(bodies: Bodies, way: Array) -> None:
     """Displace the bodies that move by themselves by (n, 6) metres and radians, in place."""
     now = np.empty((3, 3))

@@ -14,6 +14,7 @@ from wholebody.base.compiled import compiled
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
+from wholebody.geometry.flesh import is_flesh
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.matter.body import MATERIALS, MassProperties, Material, Surface, mass_properties, surface
@@ -32,14 +33,18 @@ class Surfaces:
     """What happens where two of so many named bodies touch, asked once for each two."""
 
     def __init__(self, scene: Scene, names: Sequence[str]) -> None:
-        self._scene, self._names, self._known = scene, names, dict[tuple[int, int], Surface]()
+        self._scene, self._names = scene, names
+        self._known = np.full((len(names), len(names), 2), np.nan)
 
     def __call__(self, both: Indices) -> tuple[Array, Array]:
         """Restitution and friction (k,) of bodies (k, 2)."""
-        pairs, known = [(first, second) for first, second in both.tolist()], self._known
-        for first, second in set(pairs) - known.keys():
-            known[first, second] = surface_of(self._scene, self._names[first], self._names[second])
-        found = np.array([known[pair] for pair in pairs]).reshape(-1, 2)
+        first, second = both.T
+        found = self._known[first, second]
+        unknown = np.isnan(found[:, 0])
+        if unknown.any():
+            for one, other in set(map(tuple, both[unknown].tolist())):
+                self._known[one, other] = surface_of(self._scene, self._names[one], self._names[other])
+            found = self._known[first, second]
         return found[:, 0], found[:, 1]
 
 
@@ -47,9 +52,10 @@ class PlacedProximity(Proximity):
     """Distances between pieces that stand where they are said to stand."""
 
     def place(self, data: Array) -> Array:
-        """Take placements (pieces, 4, 3) over, in the place of Pinocchio's data; see `Contacts.placements`."""
+        """Take placements (pieces, 4, 3), flesh as of bent limbs, in the place of Pinocchio's data; the pieces' own."""
         self.distances.put(data)
-        return data
+        self.distances.place_flesh()
+        return self.distances.placed
 
 
 class SweptPoints(NamedTuple):
@@ -140,6 +146,7 @@ class Pieces:
                 at = scene.model.frames[scene.frame_id(owner)].placement.actInv(piece.placement)
                 made_of.append(HUMAN)
             pieces.append(pin.GeometryObject(piece.name, 0, 0, pin.SE3.Identity(), piece.geometry))
+            pieces[-1].meshPath = piece.meshPath if is_flesh(piece) else ""
             body.append(self.index[owner])
             local.append([*at.rotation.T, at.translation])
         self.body: Indices = np.array(body, dtype=np.intp)
@@ -252,6 +259,7 @@ class ContactFinder:
         # normals within 0.1 rad are the same: coal's are off by some 0.02 rad where pieces are 50 um apart
         self._rows = ContactRowBuilder(pieces.table, 6, 0.995)
         compiled_kernel()  # not in the middle of a motion
+        self._last: tuple[Contacts, ContactPoints] | None = None  # of the last question
         self._bodies = pieces.body[pieces.table.pairs]
 
     def near(self, position: Array, rotation: Array, margin: Array, active: Mask) -> Contacts:
@@ -266,6 +274,8 @@ class ContactFinder:
 
     def points(self, contacts: Contacts) -> ContactPoints:
         """Contact points of near pairs; the normals in `contacts` become those of faces where they are meant."""
+        if self._last is not None and self._last[0] is contacts:
+            return self._last[1]
         rows = self._rows.rows(contacts)
         owner = rows.contact
         normal = rows.wrench[:, :3].copy()
@@ -273,7 +283,8 @@ class ContactFinder:
         kept = needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `step_program.TOUCH`
         owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]
-        return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])
+        self._last = contacts, ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])
+        return self._last[1]
 
 
 @compiled()

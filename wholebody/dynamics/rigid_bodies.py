@@ -21,7 +21,7 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState, Joints
-from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
+from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, Given, bounded, given_placements
 from wholebody.dynamics.passing import StepStart, free_between
 from wholebody.dynamics.pieces import ContactFinder, ContactPoints, Pieces
 from wholebody.dynamics.sleeping import Sleepers
@@ -62,7 +62,7 @@ class RigidBodies:
             UnknownNameError: a joint names a thing that is not there.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
-        self.gravity = _bounded(gravity, 1e3, "gravity")
+        self.gravity = bounded(gravity, 1e3, "gravity")
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         pieces = Pieces(scene, checks.posture(first, scene.model.nq, "start"))
         if not pieces.dynamic.any():
@@ -101,7 +101,7 @@ class RigidBodies:
 
     def velocity_at(self, name: str, point: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) in the world, m/s."""
-        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        number, point = self._number(name), bounded(point, FARTHEST, "point")
         return self._velocity(number, point - self.state.bodies.position[number])
 
     def _velocity(self, number: int, lever: Array) -> Array:
@@ -110,7 +110,7 @@ class RigidBodies:
 
     def mobility(self, name: str, point: Array) -> Array:
         """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg."""
-        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        number, point = self._number(name), bounded(point, FARTHEST, "point")
         arm = np.hstack([np.eye(3), -pin.skew(point - self.state.bodies.position[number])])
         return np.asarray(arm @ self.response(name) @ arm.T)
 
@@ -142,7 +142,7 @@ class RigidBodies:
 
     def push(self, name: str, impulse: Array, point: Array) -> None:
         """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes."""
-        lever, impulse = _bounded(point, FARTHEST, "point") - self.centre(name), _bounded(impulse, 1e6, "impulse")
+        lever, impulse = bounded(point, FARTHEST, "point") - self.centre(name), bounded(impulse, 1e6, "impulse")
         self.push_about_centre(name, np.concatenate([impulse, pin.skew(lever) @ impulse]))
 
     def push_about_centre(self, name: str, wrench: Array) -> None:
@@ -150,7 +150,7 @@ class RigidBodies:
         number, twist = self._number(name), self.state.bodies.twist
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        wrench, before = _bounded(wrench, 1e6 * FARTHEST, "wrench", 6), twist[number].copy()
+        wrench, before = bounded(wrench, 1e6 * FARTHEST, "wrench", 6), twist[number].copy()
         self.state.velocity[number] += wrench[:3] / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ wrench[3:]
         self.state.bodies.moving[self._joints.linked(number)] = True
@@ -186,7 +186,7 @@ class RigidBodies:
     def advance(
         self,
         dt: float,
-        kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None,
+        kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | Given | None = None,
         borne: Collection[str] = (),
         yielding: Collection[str] = (),
         until: float = np.inf,
@@ -218,7 +218,8 @@ class RigidBodies:
         given_up = max(0, 3 - count)  # a frame of one step gives halving up once, others three times
         record = FrameRecord(stops, np.zeros((len(self.names), 6)), work=self._pushed, given_up=given_up)
         self._pushed = 0.0
-        self._find_near(dt / count)
+        if not self._still_near(dt / count):
+            self._find_near(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
             while end - record.time > 1e-9 * dt and not (until < np.inf and record.met(yielding, until)):
@@ -361,17 +362,22 @@ class RigidBodies:
 
     def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""
-        state = self.state
-        way = self._travel(time)
+        state, way = self.state, self._travel(time)
         self._margin = 1.5 * way + 2e-3  # m
         self._near = self._finder.near(state.bodies.position, state.bodies.rotation, self._margin, state.active)
+        self._found = state.bodies.position.copy(), state.bodies.rotation.copy(), state.active
         return float(self._near.distance.min(initial=np.inf))
+
+    def _still_near(self, time: float) -> bool:
+        """Whether the pairs found last are those that can meet within a time: no body is elsewhere or faster."""
+        (position, rotation, active), state = self._found, self.state
+        moved = max(np.abs(state.bodies.position - position).max(), np.abs(state.bodies.rotation - rotation).max())
+        faster = (self._travel(time) > self._margin).any() or (state.active & ~active).any()
+        return bool(moved < 1e-9 and not faster)  # m: rounding of what is given
 
     def _travel(self, time: float) -> Array:
         """Most that a point of each body (n,) moves in a time, metres."""
-        state = self.state
-        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.lever
-        return np.asarray((speed + np.where(state.bodies.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
+        return np.asarray(motion_kernel.travel(self.state.bodies, self._pieces.lever, self.gravity, time))
 
     def _separate(self, least: float) -> tuple[float, float]:
         """Part pieces nearer than `LEAST_GAP`; the least distance then, and the energy that was not paid [J]."""
@@ -388,11 +394,3 @@ class RigidBodies:
         if gain > 0.0:
             state.slow(state.bodies.moving & (state.bodies.position != position).any(axis=1), gain)
         return least, max(0.0, self.energy() - before)
-
-
-def _bounded(value: object, most: float, what: str, count: int = 3) -> Array:
-    """So many numbers, none of them beyond `most`."""
-    numbers = np.array(checks.numbers(value, (count,), what))
-    if np.abs(numbers).max() > most:
-        raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
-    return numbers

@@ -277,6 +277,8 @@ def compiled_kernel(_: Any) -> None:
     bodies = Bodies(np.ones(1), unit, unit, one, unit.copy(), twist, mask, mask, mask)
     motion_kernel.drift(bodies, mask, np.zeros(3), 1.0)
     motion_kernel.displace(bodies, twist)
+    motion_kernel.kinetic(bodies, mask)
+    motion_kernel.travel(bodies, np.zeros(1), np.zeros(3), 1.0)
     motion_kernel.place_pieces(one, unit, one, _integers(1), placed, placed.copy())
     pieces.needed(none, 0, vectors, vectors, some, 0.0)
     rows, joints = Rows.room(pairs, 0, mask), JointPoints(pairs, np.zeros((0, 2, 3)), no_mask)

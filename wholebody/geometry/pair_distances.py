@@ -83,6 +83,10 @@ class PairDistances:
         pin.updateGeometryPlacements(model, data, self.geometry, self.data)
         if not self._viewed:
             self.placed = self._copied()
+        self.place_flesh()
+
+    def place_flesh(self) -> None:
+        """Move flesh to where its limb has it, from where a bent one has it."""
         flesh = self._flesh
         if flesh is None:
             flesh = self._flesh = flesh_of(self.geometry)
