@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -81,15 +81,14 @@ class QPMultistart(Search):
         for ahead in () if begin else (0.0, 1.0):
             there = self._nearer(seated(self.problem, self.lineariser.state, self._start, ahead))
             yield Attempt(there, self.directly, "from the seat")
+        # From upright, descents into what is low end in poor minima: one leg ahead, or beside the feet.
+        yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
         yield Attempt(least_effort(self.problem), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
         self._least = least
-        if not least:
-            low = crouched(self.problem, self.lineariser.state, self._start)
-            yield Attempt(self._nearer([] if low is None else [low]), self.directly, "from a squat")
         if self.settings.measures and not self._proven():
             yield Attempt([self._start], self._without_measures, "")
         elif not self._proven():
@@ -104,6 +103,12 @@ class QPMultistart(Search):
         missed = [each.left + each.hold for each in found]
         if min(missed) < 2 / 3 * missed[0]:  # else few goals are met from there that are not from the start
             yield known[int(np.argmin(missed))]
+
+    def _low(self) -> Iterator[Array]:
+        """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
+        low = crouched(self.problem, self.lineariser.state, self._start)
+        for q in self._nearer([] if low is None else [low]):
+            yield from [*self._before_contact(begin=[q])] or [q]
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
@@ -173,10 +178,10 @@ class QPMultistart(Search):
             self._in_contact.append(local.violation.total)
         return local
 
-    def _before_contact(self, grips: bool = False) -> Iterator[Array]:
+    def _before_contact(self, grips: bool = False, begin: Sequence[Array] = ()) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
         most = len(self.trace) + self._left
-        for local in before_contact(self.problem, self._shared, self.settings.seed, most, grips=grips):
+        for local in before_contact(self.problem, self._shared, self.settings.seed, most, grips=grips, begin=begin):
             self.spent += local.iterations
             yield local.q
 
