@@ -24,12 +24,13 @@ from wholebody.tasks.distance import Effort
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.inputs import body_of
 from wholebody.tasks.sit import Sit
+from wholebody.tasks.stand import Stand
 
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 TURN = 2.0 * np.pi  # rad: range of those
-
+HEADINGS = [pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3)) for yaw in np.arange(8) * 0.25 * np.pi]
 
 End = TypeVar("End")
 
@@ -134,9 +135,12 @@ def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array
             yield _moved(problem, state, start, move)
 
 
-def crouched(problem: Problem, state: State, start: Array) -> Array | None:
-    """The start (nq,) with everybody who balances in the posture "squatting"; None with nobody."""
-    figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
+def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
+    """The start with everybody who balances in the posture "squatting", shape (nq,); none with nobody.
+
+    Who has feet that slide faces eight directions in turn.
+    """
+    figure, moves = problem.scene.figure, list[list[Array]]()
     upright = [term for term in problem.constraints if is_a(term, UPRIGHT) and getattr(term, "balance", True)]
     for term in upright:
         body = body_of(problem.scene, term.feet)
@@ -144,8 +148,13 @@ def crouched(problem: Problem, state: State, start: Array) -> Array | None:
             continue
         usual, low = _root_at(problem, figure.neutral, body), _root_at(problem, start, body, f"{body}squatting")
         if usual is not None and low is not None:
-            move += _to_posture(problem, start, body, "squatting", root * usual.inverse() * low)
-    return _moved(problem, state, start, move) if move.any() else None
+            turns = HEADINGS if isinstance(term, Stand) else HEADINGS[:1] * len(HEADINGS)
+            down = usual.inverse() * low
+            moves.append([_to_posture(problem, start, body, "squatting", root * turn * down) for turn in turns])
+    found = [np.sum(each, axis=0) for each in zip(*moves, strict=True)]
+    for number, move in enumerate(found):
+        if not number or (move != found[0]).any():
+            yield _moved(problem, state, start, move)
 
 
 def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> Iterator[Array]:
@@ -168,8 +177,7 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> 
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
         at = middle + high * axes[2]
         moves.append([])
-        for yaw in np.arange(8) * 0.25 * np.pi:
-            turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3))
+        for turn in HEADINGS:
             way = axes[:2] @ turn.rotation[:, 0]
             edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
             root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual

@@ -48,6 +48,7 @@ class QPMultistart(Search):
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact: list[float] = []  # violations where descents from before contact ended
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
+        self._doubtful = False  # whether the start may lead to a lower minimum than a squat
         self.out_of_reach = False  # as it seems
 
     def run(
@@ -58,6 +59,7 @@ class QPMultistart(Search):
         self.out_of_reach, self._through_measure = bool(near), least
         if not near:
             self.search(self._attempts(begin))
+            other = self._start if self._doubtful and self.how == "from a squat" else other
         for q in near:
             self.accept(self._ran(self._closest(), q))
         if other is not None:
@@ -81,7 +83,7 @@ class QPMultistart(Search):
         for ahead in () if begin else (0.0, 1.0):
             there = self._nearer(seated(self.problem, self.lineariser.state, self._start, ahead))
             yield Attempt(there, self.directly, "from the seat")
-        # From upright, descents into what is low end in poor minima: one leg ahead, or beside the feet.
+        # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
         yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
         yield Attempt(least_effort(self.problem), self.directly, "from the posture of least effort")
@@ -94,20 +96,22 @@ class QPMultistart(Search):
         elif not self._proven():
             yield from self._attempts_for_feasibility()
 
-    def _nearer(self, postures: Iterable[Array]) -> Iterator[Array]:
-        """Of postures (nq,) the nearest to goals and holds, if it is nearer than the start by a third."""
+    def _nearer(self, postures: Iterable[Array], share: float = 2 / 3) -> Iterator[Array]:
+        """Of postures (nq,) the nearest to goals and holds, if it is nearer than this share of the start's distance."""
         if not (others := [*self.lineariser.defined(postures)]):
             return
         known = [self._start, *others]
         found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
         missed = [each.left + each.hold for each in found]
-        if min(missed) < 2 / 3 * missed[0]:  # else few goals are met from there that are not from the start
+        if min(missed) < share * missed[0]:  # with 2/3 few goals are met from the start that are not from there
             yield known[int(np.argmin(missed))]
 
     def _low(self) -> Iterator[Array]:
         """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
-        low = crouched(self.problem, self.lineariser.state, self._start)
-        for q in self._nearer([] if low is None else [low]):
+        squats = [*crouched(self.problem, self.lineariser.state, self._start)]
+        much = [*self._nearer(squats)]
+        for q in much or self._nearer(squats, 1.0):
+            self._doubtful = not much
             yield from [*self._before_contact(begin=[q])] or [q]
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
