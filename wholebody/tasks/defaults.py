@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from functools import partial
 from typing import TypeVar
 
@@ -72,6 +72,7 @@ def default_measures(
         return (_effort.resolve(scene, start),)
     shanks = {side for sides, _ in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
+    rest = _sitting(scene, rest, seats) if seats else rest
     pairs = [(feet, both) for feet, both in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
     effort, rhythm = _effort.resolve(scene, rest), _rhythm.resolve(scene, rest)
     if seats:
@@ -204,6 +205,18 @@ def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:
             heading = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
             q[root + 2 : root + 7] = kneeling[root + 2], 0.0, 0.0, np.sin(heading), np.cos(heading)
     return np.asarray(q)
+
+
+def _sitting(scene: Scene, start: Array, bodies: Iterable[str]) -> Array:
+    """The start with the legs of who sits as in the posture "sitting" where their thighs are upright."""
+    # Counted from standing legs, people would sit on the edge or a corner of the seat, with the legs far ahead.
+    figure, q = scene.figure, start.copy()
+    for body in bodies:
+        legs = [f"{body}{side}" for side in ("left", "right") if f"{body}{side}_leg" in figure.groups]
+        for leg in (leg for leg in legs if abs(figure.placement(start, f"{leg}_thigh").rotation[2, 2]) > 0.5):
+            places = [figure.model.joints[figure.joint_id(one)].idx_q for one in figure.groups[f"{leg}_leg"]]
+            q[places] = figure.posture(f"{body}sitting")[places]
+    return q
 
 
 def usual_constraints(
