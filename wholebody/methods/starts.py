@@ -30,7 +30,9 @@ SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share o
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 TURN = 2.0 * np.pi  # rad: range of those
-HEADINGS = [pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3)) for yaw in np.arange(8) * 0.25 * np.pi]
+HEADINGS = [
+    pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.radians(yaw)), np.zeros(3)) for yaw in (0, 45, -45, 90, -90, 135, -135, 180)
+]  # those that are turned least first
 
 End = TypeVar("End")
 
@@ -138,7 +140,7 @@ def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array
 def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start with everybody who balances in the posture "squatting", shape (nq,); none with nobody.
 
-    Who has feet that slide faces eight directions in turn.
+    Who has feet that slide faces each of `HEADINGS`.
     """
     figure, moves = problem.scene.figure, list[list[Array]]()
     upright = [term for term in problem.constraints if is_a(term, UPRIGHT) and getattr(term, "balance", True)]
@@ -158,7 +160,7 @@ def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
 
 
 def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> Iterator[Array]:
-    """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn.
+    """The start (nq,) with who sits on something in the posture "sitting" there, facing each of `HEADINGS`.
 
     The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Of several who sit
     one after the other does, then all at once, each turned by as much.
