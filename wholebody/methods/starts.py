@@ -121,10 +121,12 @@ def halfway(problem: Problem, state: State, start: Array) -> Array:
     return _moved(problem, state, start, 0.25 * (lower + upper))
 
 
-def least_effort(problem: Problem) -> list[Array]:
-    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels."""
-    start, measures = problem.scene.figure.clamp(problem.start), problem.measures
-    return [q for each in measures if type(each) is Effort and ((q := each.distance.reference) != start).any()]
+def least_effort(problem: Problem, state: State) -> list[Array]:
+    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels. It moves the state."""
+    start, model = problem.scene.figure.clamp(problem.start), problem.scene.model
+    rests = [each.distance.reference for each in problem.measures if type(each) is Effort]
+    found = [_moved(problem, state, start, pin.difference(model, start, q)) for q in rests if (q != start).any()]
+    return [q for q in found if (q != start).any()]
 
 
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:

@@ -86,7 +86,7 @@ class QPMultistart(Search):
         # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
         yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
-        yield Attempt(least_effort(self.problem), self.directly, "from the posture of least effort")
+        yield Attempt(least_effort(self.problem, self.lineariser.state), self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return

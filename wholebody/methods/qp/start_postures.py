@@ -77,7 +77,7 @@ def before_contact(
     count = 3 if grips else 24
     others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
-    usual = chain(least_effort(problem), [start], [halfway(problem, state, start)] if sides else [], others)
+    usual = chain(least_effort(problem, state), [start], [halfway(problem, state, start)] if sides else [], others)
     for q in begin or usual:
         local = led(q)
         # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
