@@ -42,7 +42,8 @@ def usual_measures(
     """The measures of a problem that states none, for its resolved terms and persons of `standing`; once a scene."""
     if not scene.figure.ranges:  # no person; to look it up by its start takes longer
         return (_effort.resolve(scene, start),)
-    feet, seats = stances(scene, start, terms), seated(scene, terms)
+    seats = seated(scene, terms)
+    feet = stances(scene, start, terms, seats)
     arms: tuple[str, ...] = ()
     if ranges:
         stated = [inputs.body_of(scene, term.feet) for term in terms if is_a(term, UPRIGHT)]
@@ -167,10 +168,13 @@ def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
     )
 
 
-def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[tuple[str, ...], bool], ...]:
-    """The feet of each person that stands and balances, or kneels, and whether one `Stand` has them all.
+def stances(
+    scene: Scene, start: Array, terms: Sequence[Constraint | Goal], seats: Mapping[str, tuple[str, str]]
+) -> tuple[tuple[tuple[str, ...], bool], ...]:
+    """The feet of each person that stands on them or kneels, and whether one `Stand` has them all and balances.
 
-    Those of somebody with one foot on one thing and one on another are together, as both belong to a stance.
+    Those of somebody with one foot on one thing and one on another are together, as both belong to a stance. Who sits
+    (see `seated`) has them where pedals are.
     """
 
     def kneels(stand: Stand) -> bool:
@@ -183,10 +187,15 @@ def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> t
         return bool(missed <= 0.05) and max(upright) < 0.5
 
     stand = [one for one in terms if is_a(one, (Stand,))]
-    found = [tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one))]
+    found = [
+        (tuple(one.feet), one.balance or bool(one.knees))
+        for one in stand
+        if not (one.knees and kneels(one))
+        and (one.balance or one.knees or inputs.body_of(scene, one.feet) not in seats)
+    ]
     single = {one.feet[0]: inputs.body_of(scene, one.feet) for one in stand if len(one.feet) == 1 and not one.knees}
-    pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet in found]
-    both = [(pair, False) if len(pair) == 2 else (feet, True) for feet, pair in zip(found, pairs, strict=True)]
+    pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet, _ in found]
+    both = [(pair, False) if len(pair) == 2 else one for one, pair in zip(found, pairs, strict=True)]
     return tuple(dict.fromkeys(both))
 
 
