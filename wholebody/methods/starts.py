@@ -161,11 +161,14 @@ def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
             yield _moved(problem, state, start, move)
 
 
-def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> Iterator[Array]:
+def seated(
+    problem: Problem, state: State, start: Array, ahead: float = 0.0, arms: str = "sitting"
+) -> Iterator[Array]:
     """The start (nq,) with who sits on something in the posture "sitting" there, facing each of `HEADINGS`.
 
-    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Of several who sit
-    one after the other does, then all at once, each turned by as much.
+    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. The arms are as in
+    a posture by name: ahead of who sits, they are above a desk and not below it. Of several who sit one after the other
+    does, then all at once, each turned by as much.
     """
     figure, moves = problem.scene.figure, list[list[Array]]()
     terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if isinstance(term, Sit)]
@@ -186,6 +189,9 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> 
             edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
             root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
             moves[-1].append(_to_posture(problem, start, body, "sitting", root))
+            if f"{body}arms" in figure.groups:
+                dofs, raised = figure.dofs([f"{body}arms"]), figure.posture(f"{body}{arms}")
+                moves[-1][-1][dofs] = pin.difference(figure.model, start, raised)[dofs]
     together = [np.sum(each, axis=0) for each in zip(*moves, strict=True)] if len(moves) > 1 else []
     for move in (*chain.from_iterable(moves), *together):
         yield _moved(problem, state, start, move)
