@@ -52,9 +52,9 @@ def test_who_reaches_from_a_stool_hardly_turns_the_pelvis(bearing: float) -> Non
 
 def test_a_hand_comes_to_a_desk_from_above() -> None:
     """It hangs below the desk where the person is put on the seat."""
-    woman = wb.load("human", sex="female", stature=1.626, mass=52.9)
-    scene = with_stool(woman).add(wb.Box((0.7, 1.4, 0.03)), name="desk", at=(0.55, 0.0, 0.69))
-    goals = [wb.Point("right_index_tip", (0.45, -0.2, 0.72))]
+    man = wb.load("human", stature=1.755, mass=61.5)
+    scene = with_stool(man).add(wb.Box((0.7, 1.4, 0.03)), name="desk", at=(0.55, 0.0, 0.71))
+    goals = [wb.Point("right_index_tip", (0.45, -0.2, 0.74))]
     solution = wb.solve(wb.Problem(scene, goals=goals, constraints=SITTING), wb.methods.QP(restarts=0))
     assert solution.solved
 

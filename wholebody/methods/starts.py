@@ -19,7 +19,7 @@ from wholebody.problem import Problem
 from wholebody.tasks.bounds import allowed
 from wholebody.tasks.checks import is_a
 from wholebody.tasks.contact_parts import Over
-from wholebody.tasks.defaults import UPRIGHT
+from wholebody.tasks.defaults import UPRIGHT, free_arms
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.inputs import body_of
@@ -166,13 +166,13 @@ def seated(
 ) -> Iterator[Array]:
     """The start (nq,) with who sits on something in the posture "sitting" there, facing each of `HEADINGS`.
 
-    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. The arms are as in
-    a posture by name: ahead of who sits, they are above a desk and not below it. Of several who sit one after the other
-    does, then all at once, each turned by as much.
+    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Arms that reach
+    are as in a posture by name: ahead of who sits, they are above a desk and not below it. Of several who sit one after
+    the other does, then all at once, each turned by as much.
     """
     figure, moves = problem.scene.figure, list[list[Array]]()
-    terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if isinstance(term, Sit)]
-    for term in terms:
+    stated = (*problem.goals, *problem.stated)
+    for term in (term for term in stated if isinstance(term, Sit)):
         body = body_of(problem.scene, [term.pelvis])
         if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:
             continue
@@ -183,15 +183,16 @@ def seated(
         middle, axes = face.at(state.update(start))
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
         at = middle + high * axes[2]
+        free = {arm.replace("_upper", "") for arm in free_arms(problem.scene, start, stated, problem.bounds, {body})}
+        groups = [f"{body}{side}_arm" for side in ("left", "right")]
+        reaching = figure.dofs([arm for arm in groups if arm in figure.groups and arm not in free])
         moves.append([])
         for turn in HEADINGS:
             way = axes[:2] @ turn.rotation[:, 0]
             edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
             root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
             moves[-1].append(_to_posture(problem, start, body, "sitting", root))
-            if f"{body}arms" in figure.groups:
-                dofs, raised = figure.dofs([f"{body}arms"]), figure.posture(f"{body}{arms}")
-                moves[-1][-1][dofs] = pin.difference(figure.model, start, raised)[dofs]
+            moves[-1][-1][reaching] = pin.difference(figure.model, start, figure.posture(f"{body}{arms}"))[reaching]
     together = [np.sum(each, axis=0) for each in zip(*moves, strict=True)] if len(moves) > 1 else []
     for move in (*chain.from_iterable(moves), *together):
         yield _moved(problem, state, start, move)

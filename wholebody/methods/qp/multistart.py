@@ -80,7 +80,7 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
-        for given in () if begin else ((0.0, "sitting"), (0.0, "arms_forward"), (1.0, "sitting")):
+        for given in () if begin else ((0.0, "arms_forward"), (0.0, "sitting"), (1.0, "sitting")):
             there = self._nearer(seated(self.problem, self.lineariser.state, self._start, *given), 1.0)
             yield Attempt(there, self.directly, "from the seat")
         # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
