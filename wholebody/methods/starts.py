@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -30,9 +30,8 @@ SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share o
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 TURN = 2.0 * np.pi  # rad: range of those
-HEADINGS = [
-    pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.radians(yaw)), np.zeros(3)) for yaw in (0, 45, -45, 90, -90, 135, -135, 180)
-]  # those that are turned least first
+YAWS = np.radians((0, 45, -45, 90, -90, 135, -135, 180))
+HEADINGS = [pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3)) for yaw in YAWS]  # those turned least first
 
 End = TypeVar("End")
 
@@ -122,7 +121,7 @@ def halfway(problem: Problem, state: State, start: Array) -> Array:
 
 
 def least_effort(problem: Problem, state: State) -> list[Array]:
-    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels. It moves the state."""
+    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels; moves the state."""
     start, model = problem.scene.figure.clamp(problem.start), problem.scene.model
     rests = [each.distance.reference for each in problem.measures if type(each) is Effort]
     found = [_moved(problem, state, start, pin.difference(model, start, q)) for q in rests if (q != start).any()]
@@ -161,9 +160,7 @@ def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
             yield _moved(problem, state, start, move)
 
 
-def seated(
-    problem: Problem, state: State, start: Array, ahead: float = 0.0, arms: str = "sitting"
-) -> Iterator[Array]:
+def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arms: str = "sitting") -> Iterator[Array]:
     """The start (nq,) with who sits on something in the posture "sitting" there, facing each of `HEADINGS`.
 
     The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Arms that reach

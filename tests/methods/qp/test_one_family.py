@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,14 +17,14 @@ MOST = np.radians(10.0)  # largest change of a joint between neighbours
 def changes(figure: wb.Figure, postures: Iterable[Array]) -> list[float]:
     """The largest change of a joint between each two neighbours, radians."""
     angles = [np.array(list(figure.joint_values(q).values())) for q in postures]
-    return [float(np.abs(b - a).max()) for a, b in zip(angles, angles[1:], strict=False)]
+    return [float(np.abs(b - a).max()) for a, b in pairwise(angles)]
 
 
 @pytest.mark.parametrize(("sex", "numbers"), [("male", (3, 4, 5, 6, 7, 8, 9)), ("female", (1, 2, 3, 4, 5, 6))])
 def test_people_lift_a_box_from_the_floor_in_one_way(sex: str, numbers: Iterable[int]) -> None:
     """From upright, half of these ended elsewhere: one leg ahead, astride or beside the box, at up to four times the
     measure.
-    """  # noqa: D205, D209
+    """  # noqa: D205
     postures = []
     for number in numbers:
         scene = wb.Scene(wb.load("human", sex=sex, percentile=3.0 + number * 94.0 / 19.0))

@@ -86,7 +86,9 @@ class QPMultistart(Search):
         # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
         yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
-        yield Attempt(least_effort(self.problem, self.lineariser.state), self.directly, "from the posture of least effort")
+        yield Attempt(
+            least_effort(self.problem, self.lineariser.state), self.directly, "from the posture of least effort"
+        )
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
@@ -97,7 +99,7 @@ class QPMultistart(Search):
             yield from self._attempts_for_feasibility()
 
     def _nearer(self, postures: Iterable[Array], share: float = 2 / 3) -> Iterator[Array]:
-        """Of postures (nq,) one that is about the nearest to goals and holds, if one is nearer than a share of the start."""
+        """Of postures (nq,) one about the nearest to goals and holds, if one is nearer than a share of the start's."""
         if not (others := [*self.lineariser.defined(postures)]):
             return
         known = [self._start, *others]
