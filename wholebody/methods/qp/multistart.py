@@ -98,17 +98,6 @@ class QPMultistart(Search):
         elif not self._proven():
             yield from self._attempts_for_feasibility()
 
-    def _nearer(self, postures: Iterable[Array], share: float = 2 / 3) -> Iterator[Array]:
-        """Of postures (nq,) one about the nearest to goals and holds, if one is nearer than a share of the start's."""
-        if not (others := [*self.lineariser.defined(postures)]):
-            return
-        known = [self._start, *others]
-        found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
-        missed = [each.left + each.hold for each in found]
-        if (least := min(missed)) < share * missed[0]:  # with 2/3 few are met from the start that are not from there
-            # m, rad: of those as near as this the first, which is turned least
-            yield next(q for q, far in zip(others, missed[1:], strict=True) if far < least + 0.3)
-
     def _low(self) -> Iterator[Array]:
         """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
         squats = [*crouched(self.problem, self.lineariser.state, self._start)]
