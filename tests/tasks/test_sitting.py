@@ -101,3 +101,41 @@ def test_feet_on_the_rungs_of_a_ladder_are_as_far_apart_as_people_stand() -> Non
     left, right = (woman.placement(solution.q, f"{side}_foot").translation for side in ("left", "right"))
     # 203 mm, with a standard deviation of 46 (Applied Sciences 2025, 15(10):5417).
     assert left[1] - right[1] == pytest.approx(0.203, abs=2.0 * 0.046)
+
+
+SHANKS = ["left_shank", "right_shank"]
+
+LINES = {
+    "bar stool": [wb.Sit("bar stool"), wb.Stand("rail", balance=False)],
+    "floor": [wb.Sit("floor")],
+    "step": [wb.Stand("floor", feet=["right_foot"]), wb.Stand("step", feet=["left_foot"], balance=False)],
+    "rung": [wb.Stand("floor", feet=["right_foot"]), wb.Stand("rung", feet=["left_foot"], balance=False)],
+    "kneeling": [wb.Stand("floor", feet=SHANKS, knees=SHANKS)],
+    "one knee": [wb.Stand("floor", feet=["left_foot", "right_shank"], knees=["right_shank"])],
+    "wall": [wb.Stand("floor", balance=False), wb.tasks.Lean("wall")],
+}
+"""Those of docs/figures.md."""
+
+
+@pytest.mark.parametrize("line", LINES)
+@pytest.mark.parametrize("given", [("female", 1.626, 52.9), ("male", 1.755, 101.6)], ids=["thin", "heavy"])
+def test_a_line_says_how_people_sit_kneel_and_stand_on_things(line: str, given: tuple[str, float, float]) -> None:
+    person = wb.load("human", sex=given[0], stature=given[1], mass=given[2])
+    scene = room(person)
+    if line == "bar stool":
+        scene.add(wb.Box((0.36, 0.36, 0.04)), name="bar stool", at=(0.0, 0.0, 0.73))
+        scene.add(wb.Cylinder(0.015, 0.5), name="rail", at=(0.25, 0.0, 0.36, *LEVEL))
+    elif line == "step":
+        scene.add(wb.Box((0.3, 0.5, 0.2)), name="step", at=(0.4, 0.1, 0.1))
+    elif line == "rung":
+        scene.add(wb.Cylinder(0.015, 0.5), name="rung", at=(0.3, 0.1, 0.3, *LEVEL))
+    elif line == "wall":
+        scene.add(wb.HalfSpace((1.0, 0.0, 0.0), -0.2), name="wall")
+    solution = wb.solve(wb.Problem(scene, constraints=LINES[line]))
+    assert solution.solved
+    assert abs(heading(person, solution.q)) < 10.0
+    assert person.placement(solution.q, "thorax").rotation[2, 2] > np.cos(np.radians(25.0))
+    # rung, step and one knee: the thigh of the leg that is up is ahead
+    ahead = np.degrees(person.joint_values(solution.q)["left_hip_flexion"])
+    assert ahead == pytest.approx({"step": 57.0, "rung": 76.0, "one knee": 90.0}.get(line, ahead), abs=12.0)
+    assert np.degrees(person.joint_values(solution.q)["neck1_flexion"]) == pytest.approx(0.0, abs=15.0)
