@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -105,7 +107,7 @@ def test_feet_on_the_rungs_of_a_ladder_are_as_far_apart_as_people_stand() -> Non
 
 SHANKS = ["left_shank", "right_shank"]
 
-LINES = {
+LINES: dict[str, list[Any]] = {
     "bar stool": [wb.Sit("bar stool"), wb.Stand("rail", balance=False)],
     "floor": [wb.Sit("floor")],
     "step": [wb.Stand("floor", feet=["right_foot"]), wb.Stand("step", feet=["left_foot"], balance=False)],

@@ -80,15 +80,16 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
-        for given in () if begin else ((0.0, "arms_forward"), (0.0, "sitting"), (1.0, "sitting")):
-            there = self._nearer(seated(self.problem, self.lineariser.state, self._start, *given), 1.0)
-            yield Attempt(there, self.directly, "from the seat")
+        rests = least_effort(self.problem, self.lineariser.state)
+        # Who stands begins on the seat, with the hands below a desk or above; who sits, only if it is much nearer.
+        seats = ((0.0, "sitting"), *[(0.0, "arms_forward")] * bool(rests), (1.0, "sitting"))
+        for given in () if begin else seats:
+            there = seated(self.problem, self.lineariser.state, self._start, *given)
+            yield Attempt(self._nearer(there, 1.0 if rests else 2 / 3), self.directly, "from the seat")
         # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
         yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
-        yield Attempt(
-            least_effort(self.problem, self.lineariser.state), self.directly, "from the posture of least effort"
-        )
+        yield Attempt(rests, self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
