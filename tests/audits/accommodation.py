@@ -99,6 +99,10 @@ class Criterion:
     def _by_thumb_tip_reach(self, scene: wb.Scene) -> list[Any]:
         return [GIRDLE, wb.Plane("left_thumb_tip", (1, 0, 0), point=(self.value, 0.0, 0.0), side="above")]
 
+    def _by_popliteal_height(self, scene: wb.Scene) -> list[Any]:
+        scene.add(wb.HalfSpace(offset=HIGH - self.value), name="footrest")
+        return [wb.Stand(on="footrest", balance=False)]
+
     def _popliteal_height(self, figure: wb.Figure) -> wb.Problem:
         scene = _seated(figure, 0.36, self.value).add(wb.HalfSpace(), name="floor")
         return wb.Problem(scene, "sitting", constraints=[SIT, wb.Stand(on="floor", balance=False)])
@@ -201,6 +205,8 @@ PAIRS = tuple(
         ("sitting_height", "eye_height_sitting"),
         ("overhead_reach_sitting", "hip_breadth_sitting"),
         ("thumb_tip_reach", "buttock_knee_length"),
+        ("popliteal_height", "thigh_clearance"),
+        ("eye_height_sitting", "thumb_tip_reach"),
     )
 )
 """Those of two dimensions."""

@@ -105,9 +105,9 @@ def test_a_joint_without_limits_starts_anywhere(problem: wb.Problem) -> None:
     assert found[:, 1].max() > 2.5
 
 
-def squats(problem: wb.Problem) -> np.ndarray | None:
+def squats(problem: wb.Problem) -> list[np.ndarray]:
     with problem.borrow() as workspace:
-        return crouched(problem, workspace.state, problem.start)
+        return [*crouched(problem, workspace.state, problem.start)]
 
 
 def test_who_balances_squats_where_the_start_is_and_looks_where_it_looks() -> None:
@@ -116,8 +116,10 @@ def test_who_balances_squats_where_the_start_is_and_looks_where_it_looks() -> No
     turn = pin.SE3(pin.utils.rotate("z", 2.0), np.array((3.0, -1.0, 0.0)))
     start, expected = human.posture("standing"), human.posture("squatting")
     start[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(start[:7]))
-    found = squats(wb.Problem(scene, start, constraints=[wb.Stand("floor")]))
-    assert found is not None
+    found, *others = squats(wb.Problem(scene, start, constraints=[wb.Stand("floor")]))
+    assert len(others) == 7  # where feet slide, turned by 45 degrees each
+    held = squats(wb.Problem(scene, start, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
+    assert len(held) == 1
     np.testing.assert_allclose(found[7:], expected[7:], atol=1e-9)
     assert pin.XYZQUATToSE3(found[:7]).isApprox(turn * pin.XYZQUATToSE3(expected[:7]), 1e-9)
 
@@ -127,8 +129,7 @@ def test_of_two_people_the_one_who_balances_squats_and_what_is_frozen_stays() ->
     scene.add(wb.HalfSpace(), name="floor")
     feet = wb.Stand("floor", feet=["anna/left_foot", "anna/right_foot"])
     problem = wb.Problem(scene, constraints=[feet, wb.Freeze("anna/left_arm")])
-    found, figure = squats(problem), scene.figure
-    assert found is not None
+    found, figure = squats(problem)[0], scene.figure
     np.testing.assert_array_equal(figure.part("ben", found), figure.part("ben", problem.start))
     still = [figure.model.joints[figure.joint_id(name)].idx_q for name in figure.joint_names("anna/left_arm")]
     np.testing.assert_array_equal(found[still], problem.start[still])
@@ -144,7 +145,7 @@ def test_nobody_squats_who_sits_kneels_or_holds_on() -> None:
         wb.Stand("floor", feet=shanks, knees=shanks),
         wb.Hold("pelvis"),
     ):
-        assert squats(wb.Problem(scene, constraints=[constraint])) is None
+        assert not squats(wb.Problem(scene, constraints=[constraint]))
 
 
 @pytest.mark.parametrize("ahead", [0.0, 1.0])

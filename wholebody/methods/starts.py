@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -19,17 +19,19 @@ from wholebody.problem import Problem
 from wholebody.tasks.bounds import allowed
 from wholebody.tasks.checks import is_a
 from wholebody.tasks.contact_parts import Over
-from wholebody.tasks.defaults import UPRIGHT
+from wholebody.tasks.defaults import UPRIGHT, free_arms
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.inputs import body_of
 from wholebody.tasks.sit import Sit
+from wholebody.tasks.stand import Stand
 
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 TURN = 2.0 * np.pi  # rad: range of those
-
+YAWS = np.radians((0, 45, -45, 90, -90, 135, -135, 180))
+HEADINGS = [pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3)) for yaw in YAWS]  # those turned least first
 
 End = TypeVar("End")
 
@@ -118,10 +120,12 @@ def halfway(problem: Problem, state: State, start: Array) -> Array:
     return _moved(problem, state, start, 0.25 * (lower + upper))
 
 
-def least_effort(problem: Problem) -> list[Array]:
-    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels."""
-    start, measures = problem.scene.figure.clamp(problem.start), problem.measures
-    return [q for each in measures if type(each) is Effort and ((q := each.distance.reference) != start).any()]
+def least_effort(problem: Problem, state: State) -> list[Array]:
+    """The postures (nq,) from which efforts count, but the start: of who kneels, one that kneels; moves the state."""
+    start, model = problem.scene.figure.clamp(problem.start), problem.scene.model
+    rests = [each.distance.reference for each in problem.measures if type(each) is Effort]
+    found = [_moved(problem, state, start, pin.difference(model, start, q)) for q in rests if (q != start).any()]
+    return [q for q in found if (q != start).any()]
 
 
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
@@ -134,9 +138,12 @@ def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array
             yield _moved(problem, state, start, move)
 
 
-def crouched(problem: Problem, state: State, start: Array) -> Array | None:
-    """The start (nq,) with everybody who balances in the posture "squatting"; None with nobody."""
-    figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
+def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
+    """The start with everybody who balances in the posture "squatting", shape (nq,); none with nobody.
+
+    Who has feet that slide faces each of `HEADINGS`.
+    """
+    figure, moves = problem.scene.figure, list[list[Array]]()
     upright = [term for term in problem.constraints if is_a(term, UPRIGHT) and getattr(term, "balance", True)]
     for term in upright:
         body = body_of(problem.scene, term.feet)
@@ -144,19 +151,25 @@ def crouched(problem: Problem, state: State, start: Array) -> Array | None:
             continue
         usual, low = _root_at(problem, figure.neutral, body), _root_at(problem, start, body, f"{body}squatting")
         if usual is not None and low is not None:
-            move += _to_posture(problem, start, body, "squatting", root * usual.inverse() * low)
-    return _moved(problem, state, start, move) if move.any() else None
+            turns = HEADINGS if isinstance(term, Stand) else HEADINGS[:1] * len(HEADINGS)
+            down = usual.inverse() * low
+            moves.append([_to_posture(problem, start, body, "squatting", root * turn * down) for turn in turns])
+    found = [np.sum(each, axis=0) for each in zip(*moves, strict=True)]
+    for number, move in enumerate(found):
+        if not number or (move != found[0]).any():
+            yield _moved(problem, state, start, move)
 
 
-def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> Iterator[Array]:
-    """The start (nq,) with who sits on something in the posture "sitting" there, facing eight directions in turn.
+def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arms: str = "sitting") -> Iterator[Array]:
+    """The start (nq,) with who sits on something in the posture "sitting" there, facing each of `HEADINGS`.
 
-    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Of several who sit
-    one after the other does, then all at once, each turned by as much.
+    The pelvis is in the middle of the seat, or `ahead` of it: 1 is as near to the edge as it may be. Arms that reach
+    are as in a posture by name: ahead of who sits, they are above a desk and not below it. Of several who sit one after
+    the other does, then all at once, each turned by as much.
     """
     figure, moves = problem.scene.figure, list[list[Array]]()
-    terms: list[Any] = [term for term in (*problem.goals, *problem.constraints) if isinstance(term, Sit)]
-    for term in terms:
+    stated = (*problem.goals, *problem.stated)
+    for term in (term for term in stated if isinstance(term, Sit)):
         body = body_of(problem.scene, [term.pelvis])
         if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:
             continue
@@ -167,13 +180,16 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0) -> 
         middle, axes = face.at(state.update(start))
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
         at = middle + high * axes[2]
+        free = {arm.replace("_upper", "") for arm in free_arms(problem.scene, start, stated, problem.bounds, {body})}
+        groups = [f"{body}{side}_arm" for side in ("left", "right")]
+        reaching = figure.dofs([arm for arm in groups if arm in figure.groups and arm not in free])
         moves.append([])
-        for yaw in np.arange(8) * 0.25 * np.pi:
-            turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3))
+        for turn in HEADINGS:
             way = axes[:2] @ turn.rotation[:, 0]
             edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
             root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
             moves[-1].append(_to_posture(problem, start, body, "sitting", root))
+            moves[-1][-1][reaching] = pin.difference(figure.model, start, figure.posture(f"{body}{arms}"))[reaching]
     together = [np.sum(each, axis=0) for each in zip(*moves, strict=True)] if len(moves) > 1 else []
     for move in (*chain.from_iterable(moves), *together):
         yield _moved(problem, state, start, move)

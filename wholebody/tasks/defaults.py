@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from functools import partial
 from typing import TypeVar
 
@@ -42,7 +42,8 @@ def usual_measures(
     """The measures of a problem that states none, for its resolved terms and persons of `standing`; once a scene."""
     if not scene.figure.ranges:  # no person; to look it up by its start takes longer
         return (_effort.resolve(scene, start),)
-    feet, seats = stances(scene, start, terms), seated(scene, terms)
+    seats = seated(scene, terms)
+    feet = stances(scene, start, terms, seats)
     arms: tuple[str, ...] = ()
     if ranges:
         stated = [inputs.body_of(scene, term.feet) for term in terms if is_a(term, UPRIGHT)]
@@ -72,6 +73,7 @@ def default_measures(
         return (_effort.resolve(scene, start),)
     shanks = {side for sides, _ in stances for side in sides if side.endswith("_shank")}
     rest = _kneeling(scene, start, shanks) if shanks else start
+    rest = _sitting(scene, rest, seats) if seats else rest
     pairs = [(feet, both) for feet, both in stances if len(feet) == 2 and shanks.isdisjoint(feet)]
     effort, rhythm = _effort.resolve(scene, rest), _rhythm.resolve(scene, rest)
     if seats:
@@ -166,10 +168,13 @@ def alike(goals: Sequence[Goal], before: Sequence[Goal]) -> bool:
     )
 
 
-def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> tuple[tuple[tuple[str, ...], bool], ...]:
-    """The feet of each person that stands and balances, or kneels, and whether one `Stand` has them all.
+def stances(
+    scene: Scene, start: Array, terms: Sequence[Constraint | Goal], seats: Mapping[str, tuple[str, str]]
+) -> tuple[tuple[tuple[str, ...], bool], ...]:
+    """The feet of each person that stands on them or kneels, and whether one `Stand` has them all and balances.
 
-    Those of somebody with one foot on one thing and one on another are together, as both belong to a stance.
+    Those of somebody with one foot on one thing and one on another are together, as both belong to a stance. Who sits
+    (see `seated`) has them where pedals are.
     """
 
     def kneels(stand: Stand) -> bool:
@@ -182,10 +187,15 @@ def stances(scene: Scene, start: Array, terms: Sequence[Constraint | Goal]) -> t
         return bool(missed <= 0.05) and max(upright) < 0.5
 
     stand = [one for one in terms if is_a(one, (Stand,))]
-    found = [tuple(one.feet) for one in stand if (one.balance or one.knees) and not (one.knees and kneels(one))]
+    found = [
+        (tuple(one.feet), one.balance or bool(one.knees))
+        for one in stand
+        if not (one.knees and kneels(one))
+        and (one.balance or one.knees or inputs.body_of(scene, one.feet) not in seats)
+    ]
     single = {one.feet[0]: inputs.body_of(scene, one.feet) for one in stand if len(one.feet) == 1 and not one.knees}
-    pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet in found]
-    both = [(pair, False) if len(pair) == 2 else (feet, True) for feet, pair in zip(found, pairs, strict=True)]
+    pairs = [tuple(sorted(foot for foot in single if single[foot] == single.get(feet[0], ""))) for feet, _ in found]
+    both = [(pair, False) if len(pair) == 2 else one for one, pair in zip(found, pairs, strict=True)]
     return tuple(dict.fromkeys(both))
 
 
@@ -204,6 +214,18 @@ def _kneeling(scene: Scene, start: Array, shanks: Set[str]) -> Array:
             heading = 0.5 * np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
             q[root + 2 : root + 7] = kneeling[root + 2], 0.0, 0.0, np.sin(heading), np.cos(heading)
     return np.asarray(q)
+
+
+def _sitting(scene: Scene, start: Array, bodies: Iterable[str]) -> Array:
+    """The start with the legs of who sits as in the posture "sitting" where their thighs are upright."""
+    # Counted from standing legs, people would sit on the edge or a corner of the seat, with the legs far ahead.
+    figure, q = scene.figure, start.copy()
+    for body in bodies:
+        legs = [f"{body}{side}" for side in ("left", "right") if f"{body}{side}_leg" in figure.groups]
+        for leg in (leg for leg in legs if abs(figure.placement(start, f"{leg}_thigh").rotation[2, 2]) > 0.5):
+            places = [figure.model.joints[figure.joint_id(one)].idx_q for one in figure.groups[f"{leg}_leg"]]
+            q[places] = figure.posture(f"{body}sitting")[places]
+    return q
 
 
 def usual_constraints(

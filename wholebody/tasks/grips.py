@@ -159,12 +159,13 @@ def _beside(place: Place, bar: Face, axis: int, state: State) -> tuple[Array, Ar
 
 
 class Looking(NamedTuple):
-    """The palm's z within an angle of a direction in the world, or of a plane across it: one row [rad]."""
+    """An axis of a frame within an angle of a direction in the world, or of a plane across it: one row [rad]."""
 
-    place: Place  # the palm
+    place: Place  # the frame, of a grip the palm
     direction: Array  # (3,) unit
     most: float  # largest angle from it [rad]
     level: bool  # whether the angle is to the plane across the direction
+    axis: Array = np.array((0.0, 0.0, 1.0))  # (3,) in the frame
     in_radians: tuple[bool, ...] = (True,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
@@ -177,7 +178,7 @@ class Looking(NamedTuple):
 
     def _signed(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, negative within, and its derivative (1, nv)."""
-        axis = state.frame(self.place.frame).rotation[:, 2]
+        axis = state.frame(self.place.frame).rotation @ self.axis
         cosine = min(max(float(axis @ self.direction), -1.0), 1.0)
         angle = abs(float(np.arcsin(cosine))) if self.level else float(np.arccos(cosine))
         slope = (1.0 if cosine > 0.0 else -1.0) if self.level else -1.0

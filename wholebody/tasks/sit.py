@@ -32,6 +32,7 @@ from wholebody.tasks.contact_parts import (
 )
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, Face, back_above, face
+from wholebody.tasks.grips import Looking
 from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_on, surface
 
 
@@ -39,7 +40,8 @@ from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segmen
 class Sit(ContactTerm):
     """Sit on a thing, upright to either side, and with the back at another thing if there is one.
 
-    Pelvis or thighs touch the seat, the middle of the pelvis is over the seat's upper face, and its left side is level.
+    Pelvis or thighs touch the seat, the middle of the pelvis is over the seat's upper face, its left side is level, and
+    it is within 60 degrees of upright.
     With a back, the trunk touches it, the pelvis is near it, and the figure looks away from it. Use it as a goal or as
     a constraint. Hold the feet, or add `Stand(on=..., balance=False)`.
 
@@ -95,7 +97,9 @@ class Sit(ContactTerm):
         deep = _depth(scene, self.pelvis, place, rest) + 0.01
         over = Over(place, seat, np.append(-edge, 0.0), np.append(edge, deep))  # 0: not below the seat
         left = _way(scene, place, rest, 1)
-        parts: list[Part] = [Gap(bottom, seat.surface, seat), over]
+        # rad: how far the pelvis may tip; who lies on the belly touches a floor with it too
+        upright = Looking(place, UP, np.pi / 3.0, level=False, axis=_way(scene, place, rest, 2))
+        parts: list[Part] = [Gap(bottom, seat.surface, seat), over, upright]
         behind = [self.pelvis] if self.erect else []  # whoever sits erect has the buttocks at the back, too
         touches = owner_pairs(bottom.owners, seat.surface.owners)
         if self.back is None:
@@ -209,7 +213,7 @@ class AtAngles(NamedTuple):
 
 
 def _way(scene: Scene, place: inputs.Place, rest: State, axis: int) -> Array:
-    """Ahead or to the left (3,), axis 0 or 1, of who sits in the axes of the pelvis."""
+    """Ahead, to the left or up (3,), axis 0, 1 or 2, of who sits in the axes of the pelvis."""
     root = inputs.root_of(scene, place)  # in the first posture it looks ahead, wherever that is
     return np.asarray(rest.frame(place.frame).rotation.T @ rest.data.oMi[root].rotation[:, axis])
 

@@ -67,7 +67,7 @@ def test_the_clock_does_not_change_the_answer(monkeypatch: pytest.MonkeyPatch) -
 
     Toes come to rest at the edge of a pedal, where the distance has a kink: the last 0.1 mm was not gone.
     """
-    problem = problem_set("drivers").make(15, 0).problem
+    problem = problem_set("drivers").make(16, 0).problem
     quick = wb.solve(problem, wb.methods.QP(measures=False))
     clock = iter([0.0])
     monkeypatch.setattr(control.time, "thread_time", lambda: next(clock, 0.9 * QP.longest))

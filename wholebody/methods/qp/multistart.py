@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -48,6 +48,7 @@ class QPMultistart(Search):
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact: list[float] = []  # violations where descents from before contact ended
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
+        self._doubtful = False  # whether the start may lead to a lower minimum than a squat
         self.out_of_reach = False  # as it seems
 
     def run(
@@ -58,6 +59,7 @@ class QPMultistart(Search):
         self.out_of_reach, self._through_measure = bool(near), least
         if not near:
             self.search(self._attempts(begin))
+            other = self._start if self._doubtful and self.how == "from a squat" else other
         for q in near:
             self.accept(self._ran(self._closest(), q))
         if other is not None:
@@ -78,32 +80,32 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
-        for ahead in () if begin else (0.0, 1.0):
-            there = self._nearer(seated(self.problem, self.lineariser.state, self._start, ahead))
-            yield Attempt(there, self.directly, "from the seat")
+        rests = least_effort(self.problem, self.lineariser.state)
+        # Who stands begins on the seat, with the hands below a desk or above; who sits, only if it is much nearer.
+        seats = ((0.0, "sitting"), *[(0.0, "arms_forward")] * bool(rests), (1.0, "sitting"))
+        for given in () if begin else seats:
+            there = seated(self.problem, self.lineariser.state, self._start, *given)
+            yield Attempt(self._nearer(there, 1.0 if rests else 2 / 3), self.directly, "from the seat")
+        # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
+        yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
-        yield Attempt(least_effort(self.problem), self.directly, "from the posture of least effort")
+        yield Attempt(rests, self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
             return
         self._least = least
-        if not least:
-            low = crouched(self.problem, self.lineariser.state, self._start)
-            yield Attempt(self._nearer([] if low is None else [low]), self.directly, "from a squat")
         if self.settings.measures and not self._proven():
             yield Attempt([self._start], self._without_measures, "")
         elif not self._proven():
             yield from self._attempts_for_feasibility()
 
-    def _nearer(self, postures: Iterable[Array]) -> Iterator[Array]:
-        """Of postures (nq,) the nearest to goals and holds, if it is nearer than the start by a third."""
-        if not (others := [*self.lineariser.defined(postures)]):
-            return
-        known = [self._start, *others]
-        found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
-        missed = [each.left + each.hold for each in found]
-        if min(missed) < 2 / 3 * missed[0]:  # else few goals are met from there that are not from the start
-            yield known[int(np.argmin(missed))]
+    def _low(self) -> Iterator[Array]:
+        """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
+        squats = [*crouched(self.problem, self.lineariser.state, self._start)]
+        much = [*self._nearer(squats)]
+        for q in much or self._nearer(squats, 1.0):
+            self._doubtful = not much
+            yield from [*self._before_contact(begin=[q])] or [q]
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
@@ -173,10 +175,10 @@ class QPMultistart(Search):
             self._in_contact.append(local.violation.total)
         return local
 
-    def _before_contact(self, grips: bool = False) -> Iterator[Array]:
+    def _before_contact(self, grips: bool = False, begin: Sequence[Array] = ()) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
         most = len(self.trace) + self._left
-        for local in before_contact(self.problem, self._shared, self.settings.seed, most, grips=grips):
+        for local in before_contact(self.problem, self._shared, self.settings.seed, most, grips=grips, begin=begin):
             self.spent += local.iterations
             yield local.q
 

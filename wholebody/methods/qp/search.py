@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from wholebody.base.arrays import Array, with_values
@@ -106,6 +108,17 @@ class Search(Multistart[LocalSolution]):
 
     def _closest(self) -> Closest:
         return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)
+
+    def _nearer(self, postures: Iterable[Array], share: float = 2 / 3) -> Iterator[Array]:
+        """Of postures (nq,) one about the nearest to goals and holds, if one is nearer than a share of the start's."""
+        if not (others := [*self.lineariser.defined(postures)]):
+            return
+        known = [self.problem.scene.figure.clamp(self.problem.start), *others]
+        found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
+        missed = [each.left + each.hold for each in found]
+        if (least := min(missed)) < share * missed[0]:  # with 2/3 few are met from the start that are not from there
+            # m, rad: of those as near as this the first, which is turned least
+            yield next(q for q, far in zip(others, missed[1:], strict=True) if far < least + 0.3)
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""

@@ -1,0 +1,66 @@
+"""Neighbouring tasks of people have neighbouring postures, each from its own start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+
+MOST = np.radians(10.0)  # largest change of a joint between neighbours
+
+
+def changes(figure: wb.Figure, postures: Iterable[Array]) -> list[float]:
+    """The largest change of a joint between each two neighbours, radians."""
+    angles = [np.array(list(figure.joint_values(q).values())) for q in postures]
+    return [float(np.abs(b - a).max()) for a, b in pairwise(angles)]
+
+
+@pytest.mark.parametrize(("sex", "numbers"), [("male", (3, 4, 5, 6, 7, 8, 9)), ("female", (1, 2, 3, 4, 5, 6))])
+def test_people_lift_a_box_from_the_floor_in_one_way(sex: str, numbers: Iterable[int]) -> None:
+    """From upright, half of these ended elsewhere: one leg ahead, astride or beside the box, at up to four times the
+    measure.
+    """  # noqa: D205
+    postures = []
+    for number in numbers:
+        scene = wb.Scene(wb.load("human", sex=sex, percentile=3.0 + number * 94.0 / 19.0))
+        scene.add(wb.HalfSpace(), name="floor")
+        scene.add(wb.Box((0.30, 0.32, 0.24)), name="box", at=(0.45, 0.0, 0.1201))
+        goals = [wb.Grasp(side, "box", kind="palm") for side in ("left", "right")]
+        solution = wb.solve(wb.Problem(scene, goals=goals, constraints=[wb.Stand("floor")]))
+        assert solution.solved
+        postures.append(solution.q)
+        feet = [scene.figure.placement(solution.q, f"{side}_foot").translation for side in ("left", "right")]
+        assert abs(feet[0][0] - feet[1][0]) < 0.02
+    assert max(changes(scene.figure, postures)) < MOST
+
+
+@pytest.mark.parametrize("bearings", [(-128.0, -125.0, -122.0), (53.0, 56.0, 60.0)])
+def test_who_reaches_down_beside_or_behind_bends_forward(bearings: tuple[float, ...]) -> None:
+    """Whose feet slide turns there; from upright some of these bent back, at 1.5 times the measure."""
+    figure = wb.load("human")
+    scene, postures = wb.Scene(figure).add(wb.HalfSpace(), name="floor"), []
+    for bearing in np.radians(bearings):
+        goals = [wb.Point("right_index_tip", (0.5 * np.cos(bearing), 0.5 * np.sin(bearing), 0.3))]
+        solution = wb.solve(wb.Problem(scene, goals=goals, constraints=[wb.Stand("floor")]))
+        assert solution.solved
+        postures.append(solution.q)
+        assert figure.joint_values(solution.q)["left_hip_flexion"] > 0.5
+    assert max(changes(figure, postures)) < MOST
+
+
+@pytest.mark.parametrize("height", [0.30, 0.62])
+def test_two_hands_alike_leave_the_body_in_the_middle(height: float) -> None:
+    """A woman leaned by 132 mm to one side, and a man had one arm otherwise than the other."""
+    woman = wb.load("human", sex="female")
+    scene = wb.Scene(woman).add(wb.HalfSpace(), name="floor")
+    goals = [wb.Point(f"{side}_palm", (0.46, y, height)) for side, y in (("left", 0.14), ("right", -0.14))]
+    solution = wb.solve(wb.Problem(scene, goals=goals, constraints=[wb.Stand("floor")]))
+    assert solution.solved
+    angles = woman.joint_values(solution.q)
+    for name in (name for name in angles if name.startswith("left_")):
+        assert angles[name] == pytest.approx(angles[f"right_{name.removeprefix('left_')}"], abs=0.02)
