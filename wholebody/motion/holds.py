@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask, with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import CLEARANCE
@@ -33,6 +33,7 @@ EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyo
 NEXT = "shoulder", "elbow", "knee", "ankle", "toe"  # where another part of a body begins: thighs sit
 BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
+STEEP = 0.4, 0.8  # cosines from up to the normal of a sole: of one held at no height yet, and of one fully held
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
 LAG = 0.3  # of 1: more lets a climber's feet fall far behind its hands, which touch what the recorded ones do
@@ -291,8 +292,8 @@ class Holds:
                 weights[number, :2] = 0.0
             elif self.points[number].lifts:
                 weights[number, 2] = 0.0
-            if not (down[number] or self.points[number].thing):
-                weights[number, 2] = 0.0  # contact says how high
+            if not self.points[number].thing:
+                weights[number, 2] *= down[number]  # contact says how high
         return goals, weights
 
     def _hangs(self, number: int, stand: Foothold | ThingContact, place: Array) -> bool:
@@ -322,15 +323,15 @@ class Holds:
             goal, most = goal - share * (way - start_of), max(most, share)
         return goal, most
 
-    def _facing_down(self, places: Array) -> Mask:
-        """(h,) whether a point, at places (h, 3), is of a sole that faces the ground."""
-        found = np.zeros(len(places), dtype=bool)
+    def _facing_down(self, places: Array) -> Array:
+        """(h,) shares of a point, at places (h, 3), by which its sole faces the ground: 0 of others."""
+        found = np.zeros(len(places))
         for own in self._soles:
             back, left, right, front = places[own[:4]]
             (x, y, z), (u, v, w) = (front - back).tolist(), (left - right).tolist()
             up = x * v - y * u  # of the normal, the cross product of both
-            # least cosine of the angle from up to the normal of a sole that faces the ground
-            found[own] = up > 0.3 * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
+            cosine = up / max(((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5, 1e-12)
+            found[own] = min(max((cosine - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0), 1.0) ** 3
         return found
 
     def landed(self, frame: int, places: Array, held: tuple[Array, Array], span: int) -> None:
