@@ -64,7 +64,7 @@ def test_a_foot_that_turns_high_in_the_air_does_not_rest(seconds: float, rests: 
 
 
 def test_a_sole_comes_to_be_held_at_its_height_while_it_turns_to_the_ground(human: wb.Figure) -> None:
-    """A foot that turns by a degree a frame, from toes down to flat: no frame pulls it down by much more than before."""
+    """A foot that turns by a degree a frame, from toes down to flat: no frame pulls it down much more."""
     motion, _ = walker(flat, 91 * DT)
     roles = matched(motion, human, None)
     every, rest = np.ones(91, dtype=bool), Foothold("left_toe", 0, 91, np.zeros(3), 0.0)

@@ -131,7 +131,7 @@ def _recognised(joints: tuple[str, ...]) -> dict[str, str]:
 
 
 def _next_to(motion: SkeletonMotion, found: Mapping[str, str]) -> dict[str, str]:
-    """The same roles, with what goes on from a knee or elbow as ankle or wrist, though it is named after foot or hand."""
+    """The same roles, with what goes on from a knee or elbow as ankle or wrist, whatever its name."""
     nearer = {"toe": ("knee", "ankle"), "hand": ("elbow", "wrist")}
     renamed = {}
     for role, joint in found.items():
