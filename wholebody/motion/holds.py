@@ -198,10 +198,8 @@ class Holds:
     ) -> tuple[Array, Array]:
         """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
         # of every `span`-th frame those beside a rest are at rest too, so that what lies between them is
-        down, strong = (
-            self._facing_down(frame, paths[frame]),
-            STRONG / self._dt**2 if again else FIRM / (span * self._dt),
-        )
+        strong = STRONG / self._dt**2 if again else FIRM / (span * self._dt)
+        down = self._facing_down(frame, paths[frame])
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
             after = bisect_right([stand.first for stand in stands], frame)
