@@ -141,6 +141,16 @@ def test_a_foot_that_is_held_up_does_not_rest() -> None:
     assert not found.rests["right_ankle"][10:].any()
 
 
+def test_knees_rest_on_the_ground_though_hands_are_recorded_below_it(human: wb.Figure, shared_data: Path) -> None:
+    """Somebody gets up with hands up to 10 cm below the soles' level: arms bend, and the body is not lifted off."""
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "deepmimic_getup_facedown.bvh")
+    clip, found = wb.retarget(motion, human), wb.motion.ground(motion)
+    for side in ("left", "right"):
+        knee = places(clip, f"{side}_knee")[found.rests[f"{side}_knee"]]
+        assert len(knee) > 10
+        assert knee[:, 2].max() < 0.16  # 0.23 m where the body goes up with the hands; 0.1 m is on the floor
+
+
 def test_feet_of_who_kneels_do_not_rest() -> None:
     motion, _ = walker(flat, 1.0)
     at = np.repeat(motion.positions[:1], len(motion), axis=0)

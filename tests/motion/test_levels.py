@@ -14,6 +14,10 @@ from tests.motion.test_ground import DT, flat, walker
 from tests.motion.test_retargeting import angles, person, places
 from wholebody.motion import retargeting
 from wholebody.motion.footholds import RestLimits, slow
+from wholebody.motion.held_points import held_points
+from wholebody.motion.holds import Holds
+from wholebody.motion.roles import matched
+from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.thing_contacts import own_rests
 
 
@@ -31,6 +35,50 @@ def test_feet_stand_on_every_level_wherever_most_time_is_spent() -> None:
     assert found.levels == pytest.approx((0.0, 0.4), abs=5e-3)
     for each in found.footholds:
         assert each.height == pytest.approx(0.4 if each.first * DT > 0.6 else 0.0, abs=5e-3)
+
+
+def test_the_floor_is_where_most_rests_are_though_some_are_lower(human: wb.Figure) -> None:
+    """A walk whose toes press in by 3.5 and by 7 cm in two of their stands: whoever stands stands on the floor."""
+    motion, stands = walker(flat, 4.0)
+    at, toes = np.array(motion.positions), motion.names.index("left_foot")
+    first = np.flatnonzero(np.diff(stands["left"].astype(int)) == 1)[:2] + 1
+    for begin, by in zip(first, (0.035, 0.07), strict=True):
+        at[begin : begin + 5, toes, 2] -= by
+    found = wb.motion.ground(pressed := dataclasses.replace(motion, positions=at))
+    assert found.levels == (0.0,)
+    assert max(each.height for each in found.footholds) == 0.0
+    heel = places(wb.retarget(pressed, human), "right_heel")[stands["right"], 2]
+    assert np.median(heel) < 2e-3
+
+
+@pytest.mark.parametrize(("seconds", "rests"), [(0.2, False), (1.0, True)])
+def test_a_foot_that_turns_high_in_the_air_does_not_rest(seconds: float, rests: bool) -> None:
+    """A kick to 0.7 m, and a foot that is set on something as high while the other one bears."""
+    motion, _ = walker(flat, 3.0)
+    at, times = np.repeat(motion.positions[:1], len(motion), axis=0), np.arange(len(motion)) * DT
+    end = 1.0 + seconds
+    up = np.interp(times, [0.5, 0.9, 1.0, end, end + 0.1, end + 0.5], [0.0, 0.78, 0.7, 0.7, 0.78, 0.0])
+    at[:, [motion.names.index(f"left_{part}") for part in ("knee", "ankle", "foot")], 2] += up[:, None]
+    found = wb.motion.ground(dataclasses.replace(motion, positions=at))
+    assert any(each.height > 0.5 for each in found.footholds) == rests
+
+
+def test_a_sole_comes_to_be_held_at_its_height_while_it_turns_to_the_ground(human: wb.Figure) -> None:
+    """A foot that turns by a degree a frame, from toes down to flat: no frame pulls it down much more."""
+    motion, _ = walker(flat, 91 * DT)
+    roles = matched(motion, human, None)
+    every, rest = np.ones(91, dtype=bool), Foothold("left_toe", 0, 91, np.zeros(3), 0.0)
+    ground = Ground((rest,), {"left_toe": every}, {"left_toe": 0.0}, (0.0,), 0.0, False, DT)
+    points = held_points(human, roles, ground)
+    held, paths = Holds(points, ground, 1.0, DT, None), {}
+    data, foot = human.model.createData(), human.model.getJointId("left_ankle_inversion")
+    pin.forwardKinematics(human.model, data, human.posture("standing"))
+    for frame in range(91):
+        turn = pin.SE3(pin.utils.rotate("y", np.radians(90.0 - frame)), np.zeros(3)) * data.oMi[foot].inverse()
+        paths[frame] = np.array([turn.act(data.oMi[point.joint].act(point.place)) for point in points])
+    pulls = np.array([held.goals(frame, paths, np.zeros(3), again=True)[1][:, 2].max() for frame in range(91)])
+    assert pulls[0] == 0.0
+    assert np.diff(pulls).max() < 0.1 * pulls[-1]
 
 
 def test_a_foot_that_trembles_rests_and_one_that_hangs_does_not() -> None:

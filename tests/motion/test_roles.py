@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from tests.motion.test_retargeting import person
-from wholebody.motion.roles import matched
+from wholebody.motion.roles import matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.structure import built_figure, upright
 
@@ -77,6 +77,27 @@ def test_nothing_is_told_where_all_joints_were_named(human: wb.Figure) -> None:
     with pytest.warns(UserWarning, match="no joint of motion is known for .*left_hand"):
         more = wb.retarget(still(("a", "b", "c", "d")), human, names=names)
     assert more.q == pytest.approx(named.q, abs=1e-6)  # what follows nothing changes nothing
+
+
+def test_what_goes_on_from_a_shank_is_an_ankle_though_it_is_named_after_the_foot() -> None:
+    """Rigs that name joints after hip, knee and foot, and after shoulder, elbow and hand, with toes and fingers."""
+    names, parents, offsets = ["hip", "chest", "head"], [-1, 0, 1], [[0.0, 0.0, 0.0], [0.0, 0.0, 0.4], [0.0, 0.0, 0.3]]
+    for side, y in (("l", 0.1), ("r", -0.1)):
+        legs = [("hip", [0, y, 0]), ("knee", [0, 0, -0.4]), ("foot", [0, 0, -0.4]), ("toe", [0.15, 0, -0.05])]
+        arms = [("shoulder", [0, y, 0.1]), ("elbow", [0, y, -0.27]), ("hand", [0, 0, -0.25]), ("finger", [0, 0, -0.1])]
+        for start, limb in ((0, legs), (1, arms)):
+            for number, (part, offset) in enumerate(limb):
+                parents.append(len(names) - 1 if number else start)
+                names.append(f"{side}{part}" if part not in ("toe", "finger") else f"{part}1.{side}")
+                offsets.append(offset)
+    turns = np.tile(np.eye(3), (2, len(names), 1, 1))
+    motion = SkeletonMotion.moved(
+        tuple(names), np.array(parents), np.array(offsets), turns, np.tile([0.0, 0.0, 0.9], (2, 1)), 0.02
+    )
+    known = skeleton_roles(motion)
+    assert (known["left_ankle"], known["left_toe"]) == ("lfoot", "toe1.l")
+    assert (known["right_wrist"], known["right_hand"]) == ("rhand", "finger1.r")
+    assert (known["pelvis"], known["chest"]) == ("hip", "chest")
 
 
 @pytest.mark.parametrize("turn", [0.0, 2.0])

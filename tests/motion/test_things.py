@@ -16,11 +16,12 @@ import wholebody as wb
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
 from wholebody.motion.held_points import HeldPoint
-from wholebody.motion.holds import Holds, Touched
+from wholebody.motion.holds import Holds
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.standing_ground import NOTHING, Foothold
 from wholebody.motion.surfaces import surface_of
 from wholebody.motion.thing_contacts import ThingContact, Things, thickness
+from wholebody.motion.touching import Touched
 
 SIZE = (0.25, 0.30, 0.2)  # m: of the box, whose sides are 3 cm inwards of the wrists
 BOX = coal.Box(*SIZE)
@@ -270,7 +271,7 @@ def test_a_hand_rests_on_the_ground_before_and_after_it_touches_a_thing() -> Non
     points = [HeldPoint("left_hand", "", 1, np.zeros(3)), HeldPoint("left_hand", "", 1, np.zeros(3), thing=True)]
     ground = replace(NOTHING, footholds=tuple(rests))
     held = Holds(points, ground, 1.0, 1 / 30, None, Touched(scene.figure, Things(scene, {}), [contact]))
-    held.begin({20: scene.figure.neutral})
+    held.begin(dict.fromkeys(range(60), scene.figure.neutral))
     paths = {frame: np.zeros((2, 3)) for frame in range(60)}
     weights = [held.goals(frame, paths, np.zeros(3))[1][:, 0] for frame in (3, 25, 45)]
     assert [(ground > 0.0, thing > 0.0) for ground, thing in weights] == [(True, False), (False, True), (True, False)]

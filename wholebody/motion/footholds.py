@@ -18,6 +18,7 @@ from wholebody.motion.windows import Window, long_runs, normal, runs
 NEARBY = 0.8  # m: ground farther away than a step says nothing of the height here
 BEFORE = 0.4  # s: how long before and after a rest a point is looked at: half of a swing
 CAME_DOWN = 0.006  # m: by which a point that rests on higher ground was above it before and after
+STEP = 0.3  # m: what rests so much higher than what bears beside it does so for WAITED, or is a kick
 SPAN = 1 / 30  # s before and after a frame between which its speed is that of a rest, whatever the rate of frames
 TREMBLES = 0.015  # m: by which a point that rests goes to and fro, as markers do
 SMOOTH = 0.04  # s: standard deviation over which places are smoothed to tell speeds of the body from those of noise
@@ -112,6 +113,7 @@ def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point
             floor = float(base[near].max(initial=-np.inf)) if near.any() else float(base.min())
             # a foot whose toes, or heel, are far from where they would stand with the rest of it is in the air
             hangs = bool((_of_one_foot(points, stands, number) & ~accepted & (away > limits.height)).any())
+            hangs = hangs or (base[number] > floor + STEP and (run.end - run.first) * dt < WAITED)  # or at its turn
             stays = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
             stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
         seen.add(number)

@@ -96,7 +96,7 @@ def _sole(figure: Figure, data: pin.Data, roles: Roles, side: str, told: str) ->
     own, ankle, heel = roles.places(figure), f"{side}_ankle", f"{side}_heel"
     frame = heel if heel in figure.frames else roles.frames[ankle]
     foot = int(figure.model.frames[figure.frame_id(frame)].parentJoint)
-    every = np.concatenate([_corners(figure, data, foot), data.oMi[foot].translation[None]])
+    every = np.concatenate([part_corners(figure, data, foot), data.oMi[foot].translation[None]])
     low, flat = float(every[:, 2].min()), _flat(every)
     (back, right), (front, left) = flat.min(axis=0), flat.max(axis=0)
     middle, toes, tip = 0.5 * (left + right), foot, front
@@ -104,7 +104,7 @@ def _sole(figure: Figure, data: pin.Data, roles: Roles, side: str, told: str) ->
     below = float(np.clip(data.oMi[joint].act(place)[0], back, front))
     hinge = np.array([front, middle, low])
     joint, place = own.get(f"{side}_toe", (foot, place))
-    if joint != foot and len(more := _corners(figure, data, joint)):
+    if joint != foot and len(more := part_corners(figure, data, joint)):
         hinge, toes, tip = data.oMi[joint].act(place), joint, float(_flat(more)[:, 0].max())
     rests = np.array([below, middle, hinge[2]])  # as high as the hinge, so that both keep their distance from above
     found, above = list[HeldPoint](), float(hinge[2] - low)
@@ -117,7 +117,7 @@ def _sole(figure: Figure, data: pin.Data, roles: Roles, side: str, told: str) ->
     return found
 
 
-def _corners(figure: Figure, data: pin.Data, joint: int) -> Array:
+def part_corners(figure: Figure, data: pin.Data, joint: int) -> Array:
     """(k, 3) lowest points, of spheres and edges too, of the pieces that a joint carries; none without pieces."""
     found = []
     for piece in figure.geometry.geometryObjects:

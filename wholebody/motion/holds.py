@@ -8,20 +8,18 @@ with it.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask, with_values
-from wholebody.figures.figure import Figure
+from wholebody.base.arrays import Array, with_values
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.posture_fit import CLEARANCE
-from wholebody.motion.roles import figure_roles
 from wholebody.motion.standing_ground import HANGS, MOST_FRAMES, Foothold, Ground
 from wholebody.motion.surfaces import Surface
-from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
+from wholebody.motion.thing_contacts import ThingContact
+from wholebody.motion.touching import Touched
 from wholebody.motion.windows import long_runs, runs
 
 FIRM, STRONG = 24.0, 3.0  # s, s²: weights of what rests over the time step in the first pass, over its square later
@@ -30,76 +28,16 @@ TOUCH = 200.0  # of what touches a thing
 BESIDE = np.array([0.1, 0.1, 1.0])  # shares of these weights: soles that meet come down beside each other
 STEP = 0.3  # m: a surface higher than this above the recording's ground is not what a sole comes down on
 EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyond an edge
-NEXT = "shoulder", "elbow", "knee", "ankle", "toe"  # where another part of a body begins: thighs sit
 BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
+STEEP = 0.4, 0.8  # cosines from up to the normal of a sole on its toes: held at no height yet, and fully held
+LAID = 4.0  # of the height of hands and knees that bear on the ground: bones, and contacts, say more
+PALM = 0.04  # m: how high above toes that stand a hand, or wrist, is recorded that bears on the ground
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
 LAG = 0.3  # of 1: more lets a climber's feet fall far behind its hands, which touch what the recorded ones do
 SPAN = 0.034  # s between the frames of the first sweeps at most: more lets feet slide, less leaves jerk
 AHEAD = 0.4  # s before a rest in which it is known: more leads longer swings to it, and postures come out later
-
-
-class Touched:
-    """What a figure touches, and with which side."""
-
-    def __init__(self, figure: Figure, things: Things, contacts: Sequence[ThingContact]) -> None:
-        self.things, self.contacts, self._figure = things, contacts, figure
-        self._data, own = figure.model.createData(), figure_roles(figure)
-        ends = [frame for role, frame in own.items() if role.split("_")[-1] in NEXT]
-        self._ends = set[int]()  # joints at which another part of the body begins
-        for at in (figure.model.frames[figure.frame_id(frame)] for frame in ends):
-            far = np.linalg.norm(at.placement.translation) > 1e-6  # the end of what the joint before carries
-            here = at.parentJoint
-            self._ends |= set(np.flatnonzero(np.array(figure.model.parents) == here).tolist()) if far else {here}
-
-    def at(self, contact: ThingContact, frame: int) -> pin.SE3:
-        """Where a thing is in a frame; what is held in the axes of a part of the body stays in these."""
-        return pin.SE3.Identity() if contact.base else self.things.at(contact.thing, frame)
-
-    def held(self, contact: ThingContact, point: HeldPoint, q: Array) -> Array:
-        """(3,) where a point is held in a thing's axes, off it by the thickness of its part on that side."""
-        pin.forwardKinematics(self._figure.model, self._data, q)
-        normal = self._data.oMi[contact.base].rotation @ self.at(contact, contact.first).rotation @ contact.normal
-        pieces = [piece for piece in self._figure.geometry.geometryObjects if piece.parentJoint == point.joint]
-        away = thickness(pieces, point.place, -self._data.oMi[point.joint].rotation.T @ normal)
-        if not self._carried(point.joint):
-            away = contact.away
-        return contact.place + (CLEARANCE + away) * contact.normal
-
-    def gap(self, contact: ThingContact, point: HeldPoint, frame: int, q: Array, alone: bool = False) -> float:
-        """Signed distance of a point's part, with what its joint carries, to a thing at a posture (nq,), metres.
-
-        `alone`: without further parts of the body, as are the hands of somebody who sits.
-        """
-        pin.forwardKinematics(self._figure.model, self._data, q)
-        own = self._part(point.joint, point.place, contact.away, alone=alone)
-        if not contact.base:
-            return least_distance(own, self.things.pieces(contact.thing, frame))
-        center = contact.place - contact.away * contact.normal
-        other = self._part(contact.base, center, contact.away, most=int(contact.thing.endswith("hand")))
-        return least_distance(own, other)
-
-    def _part(self, joint: int, center: Array, radius: float, most: int = 100, alone: bool = False) -> list[Placed]:
-        """What a joint carries; where that is nothing, a ball about a place (3,), and the limb before it."""
-        if carried := self._carried(joint, most, alone):
-            return carried
-        ball = coal.Sphere(max(radius, 1e-6)), self._data.oMi[joint] * pin.SE3(np.eye(3), center)
-        bearing = {piece.parentJoint for piece in self._figure.geometry.geometryObjects}
-        limb = max(bearing & set(self._figure.model.supports[joint]), default=joint)
-        return [ball, *self._carried(limb, 0)]
-
-    def _carried(self, joint: int, most: int = 100, alone: bool = False) -> list[Placed]:
-        """Pieces on a joint and beyond it, over `most` joints with pieces at most; `alone`: to the body's next part."""
-        model, geometry = self._figure.model, self._figure.geometry.geometryObjects
-        bearing = {piece.parentJoint for piece in geometry}
-        return [
-            (piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement)
-            for piece in geometry
-            if joint in (line := list(model.supports[piece.parentJoint]))
-            and len(bearing & (beyond := set(line[line.index(joint) + 1 :]))) <= most
-            and not (alone and beyond & self._ends)
-        ]
 
 
 class Holds:
@@ -122,6 +60,7 @@ class Holds:
         self.points, self._scale, self._surface, self._touched = points, scale, surface, touched
         self.over, self.ahead = max(1, round(OVER / dt)), max(1, round(AHEAD / dt))
         self._dt, self._lag = dt, lag
+        self._floor = min(ground.lowest.values(), default=0.0)
         contacts = () if touched is None else touched.contacts
         self.touches = bool(contacts)  # whether parts touch things, or each other
         # a part that touches a thing while it seems to rest on the ground rests on the thing
@@ -259,7 +198,8 @@ class Holds:
     ) -> tuple[Array, Array]:
         """Goals and weights (h, 3) of a frame; `paths` (h, 3) by frame without holds, `shift` (3,) of the body."""
         # of every `span`-th frame those beside a rest are at rest too, so that what lies between them is
-        down, strong = self._facing_down(paths[frame]), STRONG / self._dt**2 if again else FIRM / (span * self._dt)
+        strong = STRONG / self._dt**2 if again else FIRM / (span * self._dt)
+        down = self._facing_down(frame, paths[frame])
         goals, weights = np.array(paths[frame]), np.zeros((len(self.points), 3))
         for number, stands in enumerate(self._stands):
             after = bisect_right([stand.first for stand in stands], frame)
@@ -291,9 +231,16 @@ class Holds:
                 weights[number, :2] = 0.0
             elif self.points[number].lifts:
                 weights[number, 2] = 0.0
-            if not (down[number] or self.points[number].thing):
-                weights[number, 2] = 0.0  # contact says how high
+            if self.points[number].foot:
+                weights[number, 2] *= down[number]  # contact says how high
+            elif not self.points[number].thing:
+                weights[number, 2] = min(weights[number, 2], LAID) if all(map(self._bears, around)) else 0.0
         return goals, weights
+
+    def _bears(self, stand: Foothold | ThingContact) -> bool:
+        """Whether a hand or a knee that rests is as low as one that bears on the ground."""
+        low = isinstance(stand, Foothold) and stand.place[2] <= self._floor + stand.height + PALM
+        return low or stand.role.endswith("knee")
 
     def _hangs(self, number: int, stand: Foothold | ThingContact, place: Array) -> bool:
         """Whether all surfaces of the scene below a place (3,) of a sole are far below where it rested."""
@@ -322,15 +269,17 @@ class Holds:
             goal, most = goal - share * (way - start_of), max(most, share)
         return goal, most
 
-    def _facing_down(self, places: Array) -> Mask:
-        """(h,) whether a point, at places (h, 3), is of a sole that faces the ground."""
-        found = np.zeros(len(places), dtype=bool)
+    def _facing_down(self, frame: int, places: Array) -> Array:
+        """(h,) shares by which the soles of points, at places (h, 3), face the ground: by degrees on toes alone."""
+        found = np.zeros(len(places))
         for own in self._soles:
             back, left, right, front = places[own[:4]]
             (x, y, z), (u, v, w) = (front - back).tolist(), (left - right).tolist()
             up = x * v - y * u  # of the normal, the cross product of both
-            # least cosine of the angle from up to the normal of a sole that faces the ground
-            found[own] = up > 0.3 * ((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5
+            cosine = up / max(((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + up**2) ** 0.5, 1e-12)
+            share = min(max((cosine - STEEP[0]) / (STEEP[1] - STEEP[0]), 0.0), 1.0) ** 3
+            flat = cosine > 0.3 and any(stand.first <= frame < stand.end for stand in self._stands[own[0]])
+            found[own] = 1.0 if flat else share
         return found
 
     def landed(self, frame: int, places: Array, held: tuple[Array, Array], span: int) -> None:
@@ -379,6 +328,9 @@ class Holds:
                     flat = np.sqrt(max(length**2 - rise**2, 0.0)) / max(float(np.linalg.norm(along[:2])), 1e-9)
                     place = np.array([*(pivot[:2] + flat * along[:2]), 0.0])
             place[2] = point.above + self._height(number, place, stand, paths, frames)
+        elif self._touched is not None and self._bears(stand):
+            rises = [self._touched.rise(point, self._free[frame]) for frame in frames]
+            place[2] = CLEARANCE + self._scale * stand.height + np.mean(rises)
         self._places[number, stand.first] = place
         return place
 

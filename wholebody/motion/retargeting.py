@@ -21,7 +21,7 @@ from wholebody.motion.carrying import as_carried, brought_back, carrier
 from wholebody.motion.clip import Clip, thing_tracks
 from wholebody.motion.files.base import check_one
 from wholebody.motion.held_points import held_points, touching_points
-from wholebody.motion.holds import LAG, Holds, Touched
+from wholebody.motion.holds import LAG, Holds
 from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.retarget_run import Run
 from wholebody.motion.retarget_targets import (
@@ -47,6 +47,7 @@ from wholebody.motion.thing_contacts import (
     own_rests,
     still_things,
 )
+from wholebody.motion.touching import Touched
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told

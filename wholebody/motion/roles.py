@@ -99,7 +99,7 @@ def _joints(
     motion: SkeletonMotion, given: Mapping[str, Mapping[str, str]]
 ) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
     """Role to joint of all that are known, of those by structure, and of those given."""
-    found = _recognised(motion.names)
+    found = _next_to(motion, _recognised(motion.names))
     said = _checked(given.get("skeleton", {}), motion.names, "joint of the skeleton")
     found = {role: joint for role, joint in found.items() if joint not in said.values()} | said
     more = {} if said or set(ROLES) <= found.keys() else _by_structure(motion, found)
@@ -128,6 +128,19 @@ def _recognised(joints: tuple[str, ...]) -> dict[str, str]:
         if len(found) >= 6 and len(found) > len(best):
             best = found
     return best
+
+
+def _next_to(motion: SkeletonMotion, found: Mapping[str, str]) -> dict[str, str]:
+    """The same roles, with what goes on from a knee or elbow as ankle or wrist, whatever its name."""
+    nearer = {"toe": ("knee", "ankle"), "hand": ("elbow", "wrist")}
+    renamed = {}
+    for role, joint in found.items():
+        side, _, part = role.partition("_")
+        before, here = (f"{side}_{other}" for other in nearer.get(part, (part, part)))
+        parent = motion.parents[motion.names.index(joint)]
+        own = here not in found and parent >= 0 and motion.names[parent] == found.get(before)
+        renamed[here if own else role] = joint
+    return renamed
 
 
 def _plain(joint: str) -> str:

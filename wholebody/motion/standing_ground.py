@@ -323,8 +323,10 @@ def _levelled(heights: Array, counts: Indices) -> tuple[Array, tuple[float, ...]
             continue
         settled[gathered] = np.median(np.repeat(heights[gathered], counts[gathered]))
         levels.append(float(settled[gathered][0]))
-    low = float(settled.min())
-    return settled, (0.0,) if uneven else tuple(level - low for level in levels), uneven
+    if uneven:
+        return settled, (0.0,), True
+    settled = np.maximum(settled, levels[0])  # nothing rests below the floor: a sole rolls there, or errors of markers
+    return settled, tuple(level - levels[0] for level in levels), False
 
 
 def _tilt(places: Array, heights: Array, settled: Array) -> float:
