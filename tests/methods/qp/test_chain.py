@@ -17,7 +17,7 @@ from wholebody.figures.state import State
 from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.qp import chain_kernel
-from wholebody.methods.qp.chain import from_seeds, goal_entries
+from wholebody.methods.qp.chain import chains_of, from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
 from wholebody.methods.qp.settings import Settings
@@ -101,6 +101,21 @@ def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
 def descended(chain, goals, nearest, asked, seeds):
     """What descents from seeds (k, n), which become where they end, find (k, 4)."""
     return chain.descents(goals.tables[None], goals, nearest[None], asked, seeds[None], len(seeds))[0][0]
+
+
+def test_scenes_of_a_figure_share_its_chains(arm):
+    """What stands around changes the answer and no chain; another figure, here with other limits, has its own."""
+    rng = np.random.default_rng(5)
+    goal, start = random_goal(arm, "tip", rng, False), np.zeros(arm.model.nq)
+    alone = wb.Problem(wb.Scene(arm), start, goals=[goal])
+    free = wb.solve(alone)
+    elbow = State(arm.model).update(free.q).joints[3, 3]
+    among = wb.Problem(wb.Scene(arm).add(wb.Sphere(0.05), name="ball", at=elbow), start, goals=[goal])
+    assert wb.solve(among).solved
+    assert not np.allclose(wb.solve(among).q, free.q, atol=1e-3)
+    assert np.array_equal(wb.solve(alone).q, free.q)
+    assert chains_of(alone) is chains_of(among)
+    assert chains_of(alone) is not chains_of(wb.Problem(wb.Scene(spatial_arm()), start, goals=[goal]))
 
 
 @pytest.mark.parametrize("turned", [False, True])
