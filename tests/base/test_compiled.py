@@ -304,3 +304,29 @@ def test_another_process_compiles_the_longest_loop_where_there_are_cores(monkeyp
         importlib.import_module("wholebody.base.compiled").compile_beside()
         assert len(asked) == count
     assert asked[0][1:] == ["-m", "wholebody.base.compiled", *compiled.BESIDE]
+
+
+def test_what_both_processes_need_is_compiled_early_by_one_and_called_last_by_the_loop_of_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where another process was started, the first compilation here is followed by that of the shared loops, once."""
+    from wholebody.terms.kernel import linearise
+
+    called: list[str] = [name for name in linearise.py_func.__code__.co_names if name in ("_measures", "contact_rows")]
+    assert called == ["_measures", "contact_rows"]
+    assert compiled.SHARED == "wholebody.geometry.contact_rows"
+
+    text = "called = []\ndef compiled_kernel():\n    called.append(1)\ndef made(x):\n    return x + 1.0\n"
+    (tmp_path / "shared_of_its_own.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    module = importlib.import_module("shared_of_its_own")
+    monkeypatch.setattr("wholebody.base.compiled.SHARED", module.__name__)
+    monkeypatch.setitem(compiled._compiling, "shared", False)
+    for beside, count in (([], 0), ([None], 1), ([None], 1)):
+        monkeypatch.setattr("wholebody.base.compiled._beside", beside)
+        (tmp_path / "shared_of_its_own.py").touch()
+        assert compiled.compiled()(module.made)(1.0 if count else 1) == 2.0
+        assert len(module.called) == count
+        for kept in tmp_path.rglob("*.nb[ic]"):
+            kept.unlink()
+    sys.modules.pop("shared_of_its_own")

@@ -10,6 +10,7 @@ import pytest
 import wholebody as wb
 from tests.flesh import settle
 from wholebody.geometry import pair_distances
+from wholebody.geometry.memory_views import fields, guess_view, placement_view, result_view
 from wholebody.geometry.proximity import PairTable, Proximity
 
 SHAPES = {
@@ -281,13 +282,41 @@ def test_official_getters_stand_in_for_views(monkeypatch, lost):
             assert np.array_equal(part, want)
 
 
-def test_views_notice_another_layout():
-    from wholebody.geometry.memory_views import placement_view
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_views_show_what_pinocchio_computes_after_they_were_made(count):
+    """Of results that nothing was computed of when the view was made; the guesses are where coal begins."""
+    model, geometry, data = pin.Model(), pin.GeometryModel(), None
+    for k in range(count + 1):
+        place = pin.SE3(pin.exp3(np.full(3, 0.1 * k)), np.array([0.5 * k, 0.02 * k, 0.0]))
+        geometry.addGeometryObject(pin.GeometryObject(f"box {k}", 0, place, coal.Box(0.1, 0.2, 0.3)))
+    for k in range(count):
+        geometry.addCollisionPair(pin.CollisionPair(k, k + 1))
+    data = pin.GeometryData(geometry)
+    placed, results, guesses = (
+        view(part)
+        for view, part in (
+            (placement_view, data.oMg), (result_view, data.distanceResults), (guess_view, data.distanceRequests),
+        )
+    )  # fmt: skip
+    assert all(view is not None for view in (placed, results, guesses))
+    pin.updateGeometryPlacements(model, model.createData(), geometry, data)
+    pin.computeDistances(geometry, data)
+    for k, result in enumerate(data.distanceResults):
+        assert np.array_equal(placed[k + 1], [*data.oMg[k + 1].rotation.T, data.oMg[k + 1].translation])
+        read = [result.min_distance, *result.normal, *result.getNearestPoint1(), *result.getNearestPoint2()]
+        assert np.array_equal(fields(results)[k], read)
+        assert 0.2 < result.min_distance < 0.5
+        assert np.array_equal(guesses[k, :3], data.distanceRequests[k].cached_gjk_guess)
 
+
+def test_views_notice_another_layout():
     model = pin.buildSampleModelManipulator()
     placements = model.createData().oMi
     assert placement_view(placements) is not None
     assert placement_view([pin.SE3.Identity() for _ in range(5)][::-1]) is None
+    results = [coal.DistanceResult() for _ in range(5)][::-1]
+    assert result_view(results) is None
+    assert guess_view([coal.DistanceRequest() for _ in range(5)][::-1]) is None
 
 
 def test_nothing_to_measure(free_bodies):

@@ -174,7 +174,7 @@ def _numbers(found: Array) -> tuple[Array, float]:
 
 
 def all_pairs(built: SceneGeometry) -> Pool[AllPairs]:
-    """What judgements of a scene borrow. A problem makes the first, so its first answer is judged as fast as others."""
+    """What judgements of a scene borrow."""
     return built.pool(AllPairs, lambda: AllPairs(built))
 
 

@@ -56,6 +56,9 @@ Each module has a function `compiled_kernel`, which compiles or loads its loops.
 BESIDE = {"wholebody.terms.linearisation": "wholebody.terms.kernel"}
 """Modules of `TOGETHER` that a first solve needs last, half of all that it compiles, and where their loops are."""
 
+SHARED = "wholebody.geometry.contact_rows"
+"""A module whose loops those call last: this process compiles them early, and the other one finds them."""
+
 LOOPS = tuple(name for names in TOGETHER for name in names)
 
 PRECOMPILED = Path(__file__).with_name("precompiled")
@@ -68,7 +71,7 @@ BASELINE_FEATURES = frozenset(("+avx", "+avx2", "+bmi", "+bmi2", "+f16c", "+fma"
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_compiling = {"depth": 0, "collects": True, "alone": False}
+_compiling = {"depth": 0, "collects": True, "alone": False, "shared": False}
 _since, _seconds = {"thread_time": 0.0, "monotonic": 0.0}, {"thread_time": 0.0, "monotonic": 0.0}
 _beside: list[subprocess.Popen[bytes]] = []
 
@@ -203,6 +206,11 @@ def _cache_type() -> Any:
                     self.flush()
                 return None
 
+        def holds(self, sig: Any, target_context: Any) -> bool:
+            """Whether it is kept; while there is no file, this takes a thousandth of the time of trying to read it."""
+            index = Path(self.cache_path, f"{self._impl.filename_base}.nbi")
+            return index.is_file() and self.load_overload(sig, target_context) is not None
+
         def save_overload(self, sig: Any, data: Any) -> None:
             with suppress(Exception):  # a folder that is full or read-only: the next process compiles anew
                 self._save_overload(sig, data)
@@ -259,7 +267,7 @@ def _loop_type() -> Any:
             if _beside and self.__module__ in BESIDE.values() and isinstance(self._cache, _cache_type()):
                 # another process compiles it; reading its cache is faster than compiling it here too
                 with event.trigger_event("numba:compile", data={"dispatcher": self}):
-                    while _beside[0].poll() is None and self._cache.load_overload(sig, self.targetctx) is None:
+                    while _beside[0].poll() is None and not self._cache.holds(sig, self.targetctx):
                         time.sleep(0.05)
             with global_compiler_lock:
                 codegen = self.targetctx.codegen()
@@ -340,6 +348,10 @@ def _watch() -> None:
                 _seconds.update((clock, _seconds[clock] + getattr(time, clock)() - _since[clock]) for clock in _since)
                 if _compiling["collects"]:
                     gc.enable()
+                if _beside and not _compiling["shared"]:
+                    _compiling["shared"] = True
+                    with suppress(ImportError):  # this module may be used without the others
+                        import_module(SHARED).compiled_kernel()
 
     event.register("numba:compile", Listener())
 

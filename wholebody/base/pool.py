@@ -34,6 +34,17 @@ class Pool(Generic[T]):
             self._free.append(item)
 
 
+class Pooled:
+    """Base of what any number of runs share, and find objects of their own at: it sets `_pools` to an empty dict."""
+
+    _pools: dict[Any, Pool[Any]]
+
+    def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
+        """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""
+        pool: Pool[T] | None = self._pools.get(kind)
+        return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
+
+
 Loan: TypeAlias = AbstractContextManager[T]  # a context in which an object of a pool is borrowed
 
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, as_dict
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.base.pool import Loan, Pool
+from wholebody.base.pool import Loan, Pool, Pooled
 from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.description import Description, Mount, Place, followers_of, is_root, limits_of
 from wholebody.figures.joining import mounted_parts, posture_of_all, reduced_parts
@@ -32,7 +32,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
 copyreg.pickle(pin.Model, archived)
 
 
-class Figure(checks.FixedAttributes):
+class Figure(checks.FixedAttributes, Pooled):
     """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
     It never changes, so any number of scenes and threads may share one. It can be pickled and copied. Methods that take
@@ -107,6 +107,7 @@ class Figure(checks.FixedAttributes):
         self.mount: Mount | None = None
         self.members = MappingProxyType(dict(description.members))
         self._states = Pool(lambda: State(model), at_most=2)  # 6.5 MB for 55 freedoms, 27 MB for 95
+        self._pools = {}
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -47,9 +48,6 @@ class State:
         jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
             that follows another (mimic): `folded` and `spread` translate.
         columns: (n, 6) the same, transposed.
-        support: (njoints, n) 1 where a column moves a joint, else 0.
-        column_joint: (n,) the joint that a column belongs to.
-        parents: (njoints,) the joint that carries each joint.
         number: how many postures it was moved to.
         kept: a cache of derived quantities; `number` says of which posture.
     """
@@ -59,16 +57,12 @@ class State:
         self.model = model
         self.data = pin.Data(model)
         self.q: Array = pin.neutral(model)
-        self.support = joint_support(model)
-        self.parents: NDArray[np.intp] = np.array(list(model.parents), dtype=np.intp)
-        self.column_joint: NDArray[np.intp] = self.support.argmax(axis=0).astype(np.intp)
         self._columns = extended_columns(model)
         if self._columns is not None:
             self._fold = np.eye(model.nv)[self._columns]
         self._nq, self._plain = model.nq, model.nq == model.nv  # whether no joint has a unit vector
         self._take_jacobian()
         self._shared = np.shares_memory(self.jacobian, self.data.J)
-        self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
         self._centers: dict[range | None, Array] = {}
         self._companions: dict[object, State] = {}
@@ -112,6 +106,25 @@ class State:
         if asked != self._asked:
             self.update(q.copy())._asked = asked
         return self
+
+    @cached_property
+    def support(self) -> Array:
+        """(njoints, n) 1 where a column moves a joint, else 0."""
+        return joint_support(self.model)
+
+    @cached_property
+    def parents(self) -> NDArray[np.intp]:
+        """(njoints,) the joint that carries each joint."""
+        return np.array(list(self.model.parents), dtype=np.intp)
+
+    @cached_property
+    def column_joint(self) -> NDArray[np.intp]:
+        """(n,) the joint that a column belongs to."""
+        return np.asarray(self.support.argmax(axis=0), dtype=np.intp)
+
+    @cached_property
+    def _joints(self) -> Array | None:
+        return placement_view(self.data.oMi)
 
     def _take_jacobian(self) -> None:
         self.jacobian: Array = self.data.J.reshape(6, -1)  # of one degree of freedom Pinocchio gives (6,)

@@ -12,7 +12,6 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.flesh import Flesh, flesh_of, spread
 from wholebody.geometry.memory_views import (
     RESULT_FIELDS,
-    computed_first,
     fields,
     guess_view,
     placement_view,
@@ -45,7 +44,7 @@ class PairDistances:
     """
 
     def __init__(self, geometry: pin.GeometryModel, pairs: Indices) -> None:
-        """Lay views over results that nothing else uses, of pieces that are apart from each other."""
+        """Lay views over results that nothing else uses."""
         self.geometry, self.pairs, self.kept = geometry, pairs, len(pairs) <= KEPT
         pieces = geometry
         if not self.kept:
@@ -55,11 +54,6 @@ class PairDistances:
         view = placement_view(data.oMg)
         self._viewed = view is not None
         self.placed: Array = self._copied() if view is None else view
-        apart = np.tile(np.eye(4)[:, :3], (geometry.ngeoms, 1, 1))
-        apart[:, 3, 0] = 10.0 * np.arange(geometry.ngeoms)  # m: pieces stand anywhere
-        self.put(apart)
-        for number in computed_first(len(data.distanceResults)):
-            pin.computeDistance(geometry, data, number)
         self.results = result_view(data.distanceResults)
         self._guesses = guess_view(data.distanceRequests)
         self._single = SinglePairs(geometry)

@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Indices, Mask, brief
-from wholebody.base.pool import Pool
+from wholebody.base.pool import Pooled
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.flesh import is_flesh
@@ -68,7 +68,7 @@ class SceneObject:
     __repr__ = brief
 
 
-class SceneGeometry:
+class SceneGeometry(Pooled):
     """The geometry model of the list of objects, with the indices into it.
 
     Only the placements of the pieces of things change, by `place`. Any number of runs may share it; the data that a run
@@ -112,7 +112,7 @@ class SceneGeometry:
         self.moves = 0
         self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
         self._put_at: dict[str, int] = {}
-        self._pools: dict[Any, Pool[Any]] = {}
+        self._pools = {}
         self._known: OrderedDict[Any, Any] = OrderedDict()
 
     def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
@@ -153,11 +153,6 @@ class SceneGeometry:
                 moved[name] = (after, after)
                 continue
             moved[name] = (moved[name][0] if name in moved else before, after)
-
-    def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
-        """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""
-        pool: Pool[T] | None = self._pools.get(kind)
-        return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
 
     def known(self, key: Hashable, make: Callable[[], T]) -> T:
         """What follows from the model and a key alone, made the first time and read-only; the last 64 are kept."""

@@ -90,6 +90,18 @@ def linearise(
     joints, columns, q, placement = state
     results, index, pairs, travelled, bound, within = asked
     distance, vectors, number, pair, least, gap_wrench, gap, gap_contact, gap_joints, gap_clearance = near
+    wrench, value, jacobian, box, measure, squares = room
+    floats, integers, layout, _ = plan
+    terms = len(value)
+    column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
+    tree = (columns, column, bodies)
+    jacobian[:terms] = 0.0
+    wrench[:] = 0.0
+    _wrench_terms(plan, joints, tree, wrench, value, jacobian)
+    _coordinate_terms(plan, joints, tree, q, value, jacobian)
+    limits, limit_places = _table(plan, kinds.LIMIT)
+    _box(limits, limit_places, _floats(floats, layout, kinds.BOX), q, box)
+    _measures(plan, joints, tree, q, measure, squares)
     if known < 0:
         given = (pairs, travelled, bound)
         known, broken = gather(results, index, given, within, clearances[1], (distance, vectors, number, pair))
@@ -101,24 +113,12 @@ def linearise(
         pair[:known], distance[:known], vectors[0][:known], vectors[1][:known], vectors[2][:known], number[:known],
         placement,
     )  # fmt: skip
+    # called last, so that another process has compiled it meanwhile: see `base.compiled.SHARED`
     gaps = contact_rows(contacts, least, pieces, (gap_wrench, gap, gap_contact, gap_joints))
     for r in range(gaps):
         gap_clearance[r] = least[gap_contact[r]]
-    wrench, value, jacobian, box, measure, squares = room
-    floats, integers, layout, _ = plan
-    terms = len(value)
-    column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
-    tree = (columns, column, bodies)
-    jacobian[:terms] = 0.0
-    wrench[:] = 0.0
-    _wrench_terms(plan, joints, tree, wrench, value, jacobian)
-    for r in range(gaps):
         jacobian[terms + r] = 0.0
         _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
-    _coordinate_terms(plan, joints, tree, q, value, jacobian)
-    limits, limit_places = _table(plan, kinds.LIMIT)
-    _box(limits, limit_places, _floats(floats, layout, kinds.BOX), q, box)
-    _measures(plan, joints, tree, q, measure, squares)
     return known, gaps, False
 
 

@@ -17,7 +17,7 @@ from wholebody.figures.state import State
 from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.qp import chain_kernel
-from wholebody.methods.qp.chain import from_seeds, goal_entries
+from wholebody.methods.qp.chain import chains_of, from_seeds, goal_entries
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
 from wholebody.methods.qp.settings import Settings
 from wholebody.tasks.base import Goal
@@ -103,6 +103,21 @@ def descended(chain, goals, nearest, asked, seeds):
     return chain.descents(goals.tables[None], goals, nearest[None], asked, seeds[None], len(seeds))[0][0]
 
 
+def test_scenes_of_a_figure_share_its_chains(arm):
+    """What stands around changes the answer and no chain; another figure, here with other limits, has its own."""
+    rng = np.random.default_rng(5)
+    goal, start = random_goal(arm, "tip", rng, False), np.zeros(arm.model.nq)
+    alone = wb.Problem(wb.Scene(arm), start, goals=[goal])
+    free = wb.solve(alone)
+    elbow = State(arm.model).update(free.q).joints[3, 3]
+    among = wb.Problem(wb.Scene(arm).add(wb.Sphere(0.05), name="ball", at=elbow), start, goals=[goal])
+    assert wb.solve(among).solved
+    assert not np.allclose(wb.solve(among).q, free.q, atol=1e-3)
+    assert np.array_equal(wb.solve(alone).q, free.q)
+    assert chains_of(alone) is chains_of(among)
+    assert chains_of(alone) is not chains_of(wb.Problem(wb.Scene(spatial_arm()), start, goals=[goal]))
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_steps_are_those_of_the_textbook_method(arm, two_arms, turned):
     """`DampedLeastSquares` is an array version of the same steps, with kinematics and rows by Pinocchio."""
@@ -162,7 +177,8 @@ def test_an_end_inside_of_something_is_rejected(arm):
     solution = wb.methods.QP().solve(problem)
     assert solution.solved, solution.message
     assert solution.assessment.penetration < 1e-5
-    assert solution.assessment.measure <= wb.assess(problem, measured.q).measure + 1e-6
+    end = measured.q if measured.free is None else measured.free
+    assert solution.assessment.measure <= wb.assess(problem, end).measure + 1e-6
 
 
 def test_an_end_that_an_inequality_forbids_is_rejected(arm):

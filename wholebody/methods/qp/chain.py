@@ -52,9 +52,9 @@ class Met(NamedTuple):
 
 
 def chains_of(problem: Problem) -> Pool[Chains]:
-    """What runs on a problem's scene borrow."""
-    built, limits = problem.scene.built, problem.scene.figure.limits
-    return built.pool(Chains, lambda: Chains(built.model, limits))
+    """What runs on problems of a figure borrow: things around it change no chain."""
+    figure = problem.scene.figure
+    return figure.pool(Chains, lambda: Chains(figure.model, figure.limits))
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
