@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -168,7 +168,7 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arm
     the other does, then all at once, each turned by as much.
     """
     figure, moves = problem.scene.figure, list[list[Array]]()
-    stated = (*problem.goals, *problem.stated)
+    stated: tuple[Any, ...] = (*problem.goals, *problem.stated)
     for term in (term for term in stated if isinstance(term, Sit)):
         body = body_of(problem.scene, [term.pelvis])
         if body is None or (usual := _root_at(problem, start, body, f"{body}sitting")) is None:

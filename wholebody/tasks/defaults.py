@@ -225,7 +225,7 @@ def _sitting(scene: Scene, start: Array, bodies: Iterable[str]) -> Array:
         for leg in (leg for leg in legs if abs(figure.placement(start, f"{leg}_thigh").rotation[2, 2]) > 0.5):
             places = [figure.model.joints[figure.joint_id(one)].idx_q for one in figure.groups[f"{leg}_leg"]]
             q[places] = figure.posture(f"{body}sitting")[places]
-    return q
+    return np.asarray(q)
 
 
 def usual_constraints(

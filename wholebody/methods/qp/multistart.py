@@ -35,6 +35,8 @@ from wholebody.methods.starts import (
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 
+MUCH = 2 / 3  # share of what the start misses: where postures miss less, few goals are met from the start alone
+
 
 class QPMultistart(Search):
     """The search for one problem."""
@@ -48,8 +50,7 @@ class QPMultistart(Search):
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact: list[float] = []  # violations where descents from before contact ended
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
-        self._doubtful = False  # whether the start may lead to a lower minimum than a squat
-        self.out_of_reach = False  # as it seems
+        self._doubtful = self.out_of_reach = False  # whether the start may lead lower than a squat; as it seems
 
     def run(
         self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = (), least: float = 0
@@ -84,9 +85,8 @@ class QPMultistart(Search):
         # Who stands begins on the seat, with the hands below a desk or above; who sits, only if it is much nearer.
         seats = ((0.0, "sitting"), *[(0.0, "arms_forward")] * bool(rests), (1.0, "sitting"))
         for given in () if begin else seats:
-            there = seated(self.problem, self.lineariser.state, self._start, *given)
-            yield Attempt(self._nearer(there, 1.0 if rests else 2 / 3), self.directly, "from the seat")
-        # From upright, descents into what is low end in poor minima: one leg ahead, or bent back.
+            on, share = self._nearer(seated(self.problem, self.lineariser.state, self._start, *given))
+            yield Attempt(on if rests or share < MUCH else (), self.directly, "from the seat")
         yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
         yield Attempt(rests, self.directly, "from the posture of least effort")
@@ -101,10 +101,10 @@ class QPMultistart(Search):
 
     def _low(self) -> Iterator[Array]:
         """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
-        squats = [*crouched(self.problem, self.lineariser.state, self._start)]
-        much = [*self._nearer(squats)]
-        for q in much or self._nearer(squats, 1.0):
-            self._doubtful = not much
+        # from upright, descents into what is low end in poor minima: one leg ahead, or bent back
+        squats, share = self._nearer(crouched(self.problem, self.lineariser.state, self._start))
+        self._doubtful = share >= MUCH
+        for q in squats:
             yield from [*self._before_contact(begin=[q])] or [q]
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -109,16 +109,17 @@ class Search(Multistart[LocalSolution]):
     def _closest(self) -> Closest:
         return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)
 
-    def _nearer(self, postures: Iterable[Array], share: float = 2 / 3) -> Iterator[Array]:
-        """Of postures (nq,) one about the nearest to goals and holds, if one is nearer than a share of the start's."""
+    def _nearer(self, postures: Iterable[Array]) -> tuple[list[Array], float]:
+        """Of postures (nq,) one about the nearest to goals and holds, and the share that it misses of the start's."""
         if not (others := [*self.lineariser.defined(postures)]):
-            return
+            return [], 1.0
         known = [self.problem.scene.figure.clamp(self.problem.start), *others]
         found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
         missed = [each.left + each.hold for each in found]
-        if (least := min(missed)) < share * missed[0]:  # with 2/3 few are met from the start that are not from there
-            # m, rad: of those as near as this the first, which is turned least
-            yield next(q for q, far in zip(others, missed[1:], strict=True) if far < least + 0.3)
+        if (least := min(missed)) == missed[0]:
+            return [], 1.0
+        # m, rad: of those as near as this the first, which is turned least
+        return [next(q for q, far in zip(others, missed[1:], strict=True) if far < least + 0.3)], least / missed[0]
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""
