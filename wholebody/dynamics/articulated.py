@@ -267,8 +267,8 @@ class Articulated:
         for again in range(4):
             sag = self._sag[np.minimum(points.pair, len(self._sag) - 1)]
             room = points.gap + time**2 * sag - SKIN  # a step removes an overlap
-            # m/s: to a tolerance, so that the engine meets what ends at a contact after the step; at most
-            target = np.where(room >= 0.0, 1e-6 - room / time, np.minimum(1e-6 - room / time, 0.5))
+            # m/s, at most; what comes from afar stops short by a tolerance, so that the engine does not meet it before
+            target = np.where(room >= 0.0, -room / time, np.minimum(-room / time, 0.5)) + 1e-6 * (room > 1e-3 * time)
             speed = self._relative(points) + (points.things @ falling if points.bodies else 0.0)
             found, after, change = self._solved(inertia, points, speed, target, found)
             ahead = self.velocity + change  # impulses turn joints towards limits that were far away
