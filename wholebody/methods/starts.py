@@ -151,12 +151,12 @@ def crouched(problem: Problem, state: State, start: Array) -> Iterator[Array]:
             continue
         usual, low = _root_at(problem, figure.neutral, body), _root_at(problem, start, body, f"{body}squatting")
         if usual is not None and low is not None:
-            turns = HEADINGS if isinstance(term, Stand) else HEADINGS[:1] * len(HEADINGS)
-            down = usual.inverse() * low
-            moves.append([_to_posture(problem, start, body, "squatting", root * turn * down) for turn in turns])
+            turns, down = HEADINGS if isinstance(term, Stand) else HEADINGS[:1], usual.inverse() * low
+            made = [_to_posture(problem, start, body, "squatting", root * turn * down) for turn in turns]
+            moves.append(made * (len(HEADINGS) // len(turns)))
     found = [np.sum(each, axis=0) for each in zip(*moves, strict=True)]
     for number, move in enumerate(found):
-        if not number or (move != found[0]).any():
+        if not number or (move != found[0]).any():  # feet that are held face one way
             yield _moved(problem, state, start, move)
 
 
@@ -210,8 +210,9 @@ def _to_posture(problem: Problem, start: Array, body: str | None, name: str, roo
     figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
     q, idx = figure.posture(f"{body}{name}"), int(figure.model.joints[figure.roots[f"{body}root"]].idx_q)
     q[idx : idx + 7] = pin.SE3ToXYZQUAT(root)
-    own = [figure.model.joints[joint] for joint in figure.bodies[str(body)]]
-    dofs = np.concatenate([np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in own])
+    own = figure.bodies[str(body)]
+    first, last = (figure.model.joints[joint] for joint in (own[0], own[-1]))
+    dofs = slice(first.idx_v, last.idx_v + last.nv)
     move[dofs] = pin.difference(figure.model, start, q)[dofs]
     return move
 

@@ -19,6 +19,8 @@ from wholebody.methods.starts import Multistart
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
+from wholebody.tasks.checks import is_a
+from wholebody.tasks.defaults import UPRIGHT
 from wholebody.terms.linearisation import Lineariser
 
 
@@ -114,12 +116,21 @@ class Search(Multistart[LocalSolution]):
         if not (others := [*self.lineariser.defined(postures)]):
             return [], 1.0
         known = [self.problem.scene.figure.clamp(self.problem.start), *others]
-        found = [self.subproblem.violation(self.subproblem.rows(self.lineariser.at(q, 0.0))) for q in known]
-        missed = [each.left + each.hold for each in found]
+        missed = [self._left_at(q) for q in known]
         if (least := min(missed)) == missed[0]:
             return [], 1.0
         # m, rad: of those as near as this the first, which is turned least
         return [next(q for q, far in zip(others, missed[1:], strict=True) if far < least + 0.3)], least / missed[0]
+
+    def _left_at(self, q: Array) -> float:
+        """How far goals and holds, but for soles, are from being met at a posture (nq,) [m and rad]."""
+        state, squares = self.lineariser.state.update(q), [0.0, 0.0]
+        for goal in self.problem.goals:
+            squares[0] += float(np.sum(np.square(goal.error(state))))
+        for held in self.problem.constraints:
+            if not is_a(held, UPRIGHT) and np.any(equal := held.lower == held.upper):
+                squares[1] += float(np.sum(np.square(np.where(equal, held.value(state) - held.lower, 0.0))))
+        return float(np.sum(np.sqrt(squares)))
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
         """The end of a stage from a posture (nq,), whose iterations count."""
