@@ -261,9 +261,10 @@ class Drag(NotCopyable, Generic[Answer]):
     `over`) "qp" evades them as they come; the others meet them where they end. What they could not avoid is
     named in the answer. A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
 
-    With a budget a frame ends with what it has found by then, and the next goes on from there; joints turn by at most
-    8 rad/s, where no `Hold` is relative to another frame, as other methods than "qp" may jump. Where it was not enough
-    to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
+    With a budget a frame ends with what it has found by then, and the next goes on from there. By other methods than
+    "qp", which may jump, joints turn by at most 8 rad/s then, unless a `Hold` is relative to another frame. Where
+    it was not enough to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it
+    goes twice as far.
 
     Raises:
         InputError: a problem that the method cannot take, a goal that cannot be moved, or a value out of range.

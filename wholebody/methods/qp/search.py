@@ -127,9 +127,9 @@ class Search(Multistart[LocalSolution]):
         state, squares = self.lineariser.state.update(q), [0.0, 0.0]
         for goal in self.problem.goals:
             squares[0] += float(np.sum(np.square(goal.error(state))))
-        for held in self.problem.constraints:
-            if not is_a(held, UPRIGHT) and np.any(equal := held.lower == held.upper):
-                squares[1] += float(np.sum(np.square(np.where(equal, held.value(state) - held.lower, 0.0))))
+        for one in self.problem.constraints:
+            if not is_a(one, UPRIGHT) and np.any(equal := one.lower == one.upper):
+                squares[1] += float(np.sum(np.square(np.where(equal, one.value(state) - one.lower, 0.0))))
         return float(np.sum(np.sqrt(squares)))
 
     def _ran(self, stage: SQP | Feasibility | Closest, start: Array) -> LocalSolution:
