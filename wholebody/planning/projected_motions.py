@@ -64,17 +64,15 @@ class ProjectedMotions(Geodesics):
         return q if found is None else found
 
     def corrected(self, q: Array) -> Array:
-        """See `Geodesics`: the same two iterations for each posture, so that a smooth motion stays so.
+        """See `Geodesics`: one iteration for each posture, so that a smooth motion stays so.
 
         Pairs that two postures of a path keep apart may overlap by the square of a step in between.
         """
-        for _ in range(2):
-            at = self._lineariser.packed(q, 1e-3)  # m: farther than frames are displaced
-            aims = np.hstack([self._bounds, np.vstack([at.clearance - MISSED, np.full(len(at.gap), np.inf)])])
-            never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(aims)
-            displace(at.jacobian, np.hstack([at.value, at.gap]), never, aims, at.box, self._away)
-            q = np.asarray(pin.integrate(self._model, q, self._away))
-        return q
+        at = self._lineariser.packed(q, 1e-3)  # m: farther than frames are displaced
+        aims = np.hstack([self._bounds, np.vstack([at.clearance - MISSED, np.full(len(at.gap), np.inf)])])
+        never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(aims)
+        displace(at.jacobian, np.hstack([at.value, at.gap]), never, aims, at.box, self._away)
+        return np.asarray(pin.integrate(self._model, q, self._away))
 
     def admit(self, q: Array) -> None:
         """See `Geodesics`."""
