@@ -793,7 +793,7 @@ def seated() -> tuple[wb.Problem, Array]:
     scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.6, 0.0, high + 0.42, 0.0, -0.0697565, 0.0, 0.9975641))
     scene.add(wb.Box((0.7, 1.4, 0.03)), name="desk", at=(0.23, 0.0, high + 0.285))
     scene.add(wb.Box((0.05, 0.55, 0.35)), name="screen", at=(0.15, 0.0, high + 0.48))
-    sits = [wb.Sit("seat", back="backrest"), wb.Stand("floor", balance=False)]
+    sits: list[Any] = [wb.Sit("seat", back="backrest"), wb.Stand("floor", balance=False)]
     hands = [wb.Point(f"{side}_index_tip", (0.0, y, high + 0.33)) for side, y in (("right", -0.18), ("left", 0.18))]
     q = wb.solve(wb.Problem(scene, "sitting", goals=[*hands, sits[0]], constraints=sits[1:])).q
     q = wb.solve(wb.Problem(scene, q, goals=hands, constraints=sits)).q

@@ -77,7 +77,7 @@ class Sampler:
     def _staying(self) -> Mask:
         """Random freedoms (nv,): all but those of a limb, or a random share of all."""
         model, rng = self._figure.model, self._rng
-        stays = rng.uniform(size=model.nv) > rng.uniform()
+        stays: Mask = rng.uniform(size=model.nv) > rng.uniform()
         if rng.uniform() < 0.5:
             above = model.supports[int(rng.integers(1, model.njoints))]
             moving = [model.joints[j] for j in model.subtrees[above[int(rng.integers(1, len(above)))]]]
