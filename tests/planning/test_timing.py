@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 import wholebody as wb
 from wholebody.planning.smoothing import places
-from wholebody.planning.timing import Pace, Timing, squared_rates, used
+from wholebody.planning.timing import Pace, Timing, least_time, squared_rates, used
 
 
 @pytest.mark.parametrize("length", [0.1, 2.0])
@@ -24,6 +24,17 @@ def test_one_joint_takes_the_time_of_a_trapezium(length: float, planar_arm: Call
     assert (len(q) - 1) * 1e-3 == pytest.approx(expected, rel=0.03)
     assert max(used(figure, q, pace)) <= 1.001
     assert (q[0], q[-1]) == (0.0, length)
+
+
+def test_no_motion_is_sooner_than_joints_rest_where_they_turn_back(planar_arm: Callable[..., wb.Figure]) -> None:
+    """One goes 2 rad there and 1 back at full speed, the other one 0.2 rad, which is too short for that."""
+    figure, pace = planar_arm((0.5, 0.5)), Pace(velocity=1.5, acceleration=4.0)
+    path = [np.array(each) for each in ((0.0, 0.0), (1.2, 0.1), (2.0, 0.1), (2.0, 0.2), (1.0, 0.2))]
+    assert least_time(figure, path, pace) == pytest.approx(3.0 / 1.5 + 2.0 * 1.5 / 4.0)
+    assert least_time(figure, [np.array((0.0, each)) for each in (0.0, 0.2)], pace) == pytest.approx(
+        2.0 * np.sqrt(0.2 / 4.0)
+    )
+    assert least_time(figure, [path[0], path[0]], pace) == 0.0
 
 
 def test_rates_are_the_largest_that_a_linear_program_finds() -> None:

@@ -57,7 +57,7 @@ class Geodesics:
         self._known: dict[tuple[bytes, bool], Seen | None] = {}
         self._clearance = problem.clearance
         self.partial = True  # whether one joint may move in another way than before, and all others as they did
-        self._least = np.full(len(workspace.table.pairs), problem.clearance)
+        self._least = np.array(problem.clearances)
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
         # of every kind of pairs by every freedom
@@ -67,8 +67,13 @@ class Geodesics:
         self._values = ConstraintValues(terms, state)
         each = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         sides, inwards = np.hstack([np.zeros((2, 0)), *each]), np.array([[1.0], [-1.0]])
-        self._kept = Kept(sides + INSIDE * inwards, np.full(len(self._least), MARGIN))
-        self._followed = Kept(sides - MISSED * inwards, np.full(len(self._least), 0.5 * MARGIN))
+        room = np.full(len(self._least), MARGIN)
+        # what a constraint lets touch is as near as that says, and between two postures as near as at an end
+        brought = frozenset(pair for term in terms for pair in term.touching)
+        touching = problem.scene.built.between(brought) if brought else np.zeros(len(room), dtype=bool)
+        self._least[touching], room[touching] = -MISSED - self.bent, MISSED + self.bent - 2.0 * NOISE
+        self._kept = Kept(sides + INSIDE * inwards, room)
+        self._followed = Kept(sides - MISSED * inwards, 0.5 * room)
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
         if len(unbounded):
             names = [workspace.owners[piece] for piece in pairs[unbounded[0]]]
@@ -166,15 +171,16 @@ class Geodesics:
 
     def met(self, q: Array) -> bool:
         """Whether a posture (nq,) meets constraints as postures of paths do."""
-        return self._within(q, self._kept.sides)
+        return self._within(q, self._kept)
 
     def keeps(self, q: Array) -> bool:
         """Whether a posture (nq,) misses no constraint by more than steps may."""
-        return self._within(q, self._followed.sides)
+        return self._within(q, self._followed)
 
-    def _within(self, q: Array, sides: Array) -> bool:
+    def _within(self, q: Array, kept: Kept) -> bool:
+        """Whether values of constraints are between sides at a posture (nq,), where the state is afterwards."""
         values = self._values.at(self._workspace.state.update(q))
-        return bool((values >= sides[0]).all() and (values <= sides[1]).all())
+        return bool((values >= kept.sides[0]).all() and (values <= kept.sides[1]).all())
 
     def follows(self, q: Array, there: Array) -> bool:
         """Whether a step of a tracker from q to a posture (nq,) is free, and misses nothing on the way.
@@ -195,16 +201,15 @@ class Geodesics:
         if key not in self._known:
             if len(self._known) >= 128:  # those of a path are looked at again and again
                 self._known.clear()
-            self._known[key] = self._looked(q, *kept)
+            self._known[key] = self._looked(q, kept)
         return self._known[key]
 
-    def _looked(self, q: Array, sides: Array, required: Array) -> Seen | None:
-        proximity, state = self._workspace.proximity, self._workspace.state.update(q)
-        values = self._values.at(state)
-        if (values < sides[0]).any() or (values > sides[1]).any():
+    def _looked(self, q: Array, kept: Kept) -> Seen | None:
+        if not self._within(q, kept):
             return None
-        room = proximity.least(state.data, 0.02) - self._least  # m; larger: fewer and dearer queries
-        return Seen(room, proximity.distances.placed.copy()) if (room >= required).all() else None
+        proximity, data = self._workspace.proximity, self._workspace.state.data
+        room = proximity.least(data, 0.02) - self._least  # m; larger: fewer and dearer queries
+        return Seen(room, proximity.distances.placed.copy()) if (room >= kept.room).all() else None
 
     def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None, kept: Kept | None = None) -> bool:
         """Whether the motion by a tangent (nv,) from q (nq,) is free, by halves, the longest ones first.

@@ -30,7 +30,7 @@ from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.search import Search
 from wholebody.planning.smoothing import length, refined, resampled, smooth
 from wholebody.planning.tightening import tighten
-from wholebody.planning.timing import Pace, Timing, used
+from wholebody.planning.timing import Pace, Timing, least_time, used
 from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
@@ -267,10 +267,9 @@ class _Judge:
 
     def in_time(self, path: list[Array], share: float = 1.0) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
-        figure = self.problem.scene.figure
-        steps = np.array([pin.difference(figure.model, *pair) for pair in pairwise(path)]).reshape(-1, figure.model.nv)
-        fastest = float((np.abs(steps) / self._pace.fastest(figure)).max(axis=1).sum())
-        left, judging = BUDGET.left, self._frame * (0.6 + 2.0 * fastest) / self._pace.dt
+        # smooth motions take twice as long as they have to
+        seconds = 0.6 + 2.0 * least_time(self.problem.scene.figure, path, self._pace)
+        left, judging = BUDGET.left, self._frame * seconds / self._pace.dt
         # shortcuts through a long path make it shorter, so that they have some time in any case
         return within_budget(share * max(left - judging, 0.2 * left, 1e-9))
 

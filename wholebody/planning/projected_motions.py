@@ -18,10 +18,11 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.control import BUDGET
-from wholebody.planning.local_planner import MARGIN, Geodesics, Kept
+from wholebody.planning.local_planner import MARGIN, MISSED, Geodesics, Kept
 from wholebody.planning.projection_kernel import displace
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
+from wholebody.terms.linearisation import ConstraintValues
 
 STEP = 0.05  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
 ITERATIONS = 8  # of a projection, which takes two or three from a step
@@ -48,8 +49,12 @@ class ProjectedMotions(Geodesics):
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
-        self._never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(self._bounds)
         self._away = np.zeros(self._model.nv)
+        self._last = b"", self._away  # the posture that was linearised last, and its values of constraints
+        # of steps: contacts, which take most of the time of a posture, are equalities
+        loose = [not (term.lower == term.upper).all() for term in terms]
+        self._loose = ConstraintValues([term for term, asked in zip(terms, loose, strict=True) if asked], state)
+        self._rows = np.repeat(loose, [np.size(each[0]) for each in sides])
         # what is held is missed between two postures by the square of a step; others have room as of their postures
         self._followed = Kept(np.where(self._equal, np.array([[-np.inf], [np.inf]]), self._bounds), self._followed.room)
 
@@ -59,10 +64,21 @@ class ProjectedMotions(Geodesics):
         return q if found is None else found
 
     def corrected(self, q: Array) -> Array:
-        """See `Geodesics`: the same two iterations for each posture, so that a smooth motion stays so."""
-        for _ in range(2):
-            q, _ = self._displaced(q, self._never, self._bounds)
-        return q
+        """See `Geodesics`: one iteration for each posture, so that a smooth motion stays so.
+
+        Pairs that two postures of a path keep apart may overlap by the square of a step in between.
+        """
+        at = self._lineariser.packed(q, 1e-3)  # m: farther than frames are displaced
+        aims = np.hstack([self._bounds, np.vstack([at.clearance - MISSED, np.full(len(at.gap), np.inf)])])
+        never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(aims)
+        displace(at.jacobian, np.hstack([at.value, at.gap]), never, aims, at.box, self._away)
+        return np.asarray(pin.integrate(self._model, q, self._away))
+
+    def admit(self, q: Array) -> None:
+        """See `Geodesics`."""
+        super().admit(q)
+        least = np.maximum(self._least + MISSED + self.bent, 0.0)
+        self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
 
     def _projected(self, q: Array) -> Array | None:
         aims = np.where(self._equal, self._bounds, self._kept.sides)
@@ -72,9 +88,19 @@ class ProjectedMotions(Geodesics):
                 return q
         return None
 
+    def _within(self, q: Array, kept: Kept) -> bool:
+        state = self._workspace.state.update(q)
+        if kept is self._followed:
+            values, sides = self._loose.at(state), kept.sides[:, self._rows]
+        else:
+            known, values = self._last
+            values, sides = values if known == q.tobytes() else self._values.at(state), kept.sides
+        return bool((values >= sides[0]).all() and (values <= sides[1]).all())
+
     def _displaced(self, q: Array, sides: Array, aims: Array) -> tuple[Array, bool]:
         """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""
         at, away = self._lineariser.packed(q, -1.0), self._away  # no pairs
+        self._last = q.tobytes(), at.value
         needed = displace(at.jacobian, at.value, sides, aims, at.box, away)
         return (np.asarray(pin.integrate(self._model, q, away)), True) if needed else (q, False)
 
@@ -88,12 +114,12 @@ class ProjectedMotions(Geodesics):
         return way if met else []
 
     def _stepped(self, q: Array, target: Array, most: float) -> tuple[list[Array], bool]:
-        way, gone, met = list[Array](), 0.0, self.met(target)
+        way, gone = list[Array](), 0.0
         motion = np.asarray(pin.difference(self._model, q, target))
         left = float(np.linalg.norm(motion))
         while gone + left <= most and not BUDGET.over:
             size = float(np.abs(motion).max(initial=0.0))
-            last = met and size <= STEP
+            last = size <= STEP and self.met(target)
             share = min(1.0, STEP / max(size, 1e-15))
             there = target if last else self._projected(np.asarray(pin.integrate(self._model, q, share * motion)))
             if there is None or not self._leads(q, there):

@@ -59,9 +59,9 @@ class Search:
         model, most, samples, runs = self._problem.scene.model, np.inf, 0, 0
         paths: list[list[Array]] = []
         enough: float = self._local.samples
-        while not runs or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
+        while most == np.inf or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
             # other motions are shorter than this share of the best one
-            path, trees = self._path(0.95 * most, np.inf if not runs else enough - samples)
+            path, trees = self._path(0.95 * most, np.inf if most == np.inf else enough - samples)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
@@ -77,7 +77,8 @@ class Search:
             with self._in_time(path):
                 path = nearer(self._problem, path, self._local, self._sampler)
             paths.append(path)
-            if (found := length(model, path)) < most:
+            # steps along things may be none that are proven, and trees are sought beside these
+            if (found := length(model, path)) < most and self._proven(path):
                 most = found
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])

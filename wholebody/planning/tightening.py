@@ -43,7 +43,7 @@ def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: Tr
     """A path drawn tight round things, to which few shortcuts lead as they go from one posture to another one."""
     band, damping = banded(model, path, local), DAMPING
     while len(band) > 2 and not BUDGET.over:
-        program = _programmed(model, band, slides, damping)
+        program = programmed(model, band, slides, damping)
         if program is None:
             break
         moved, cut = _moved(model, band, program, (local, slides))
@@ -63,7 +63,7 @@ def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: Tr
     return found
 
 
-def _programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, damping: float) -> Program | None:
+def programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, damping: float) -> Program | None:
     """The program of a path as it is; None where time ends before."""
     turns, rows, counts = [_turn(model, q) for q in band], list[Rows](), list[int]()
     for q, turn in zip(band[1:-1], turns[1:-1], strict=True):

@@ -7,7 +7,7 @@ pass accelerates as much as these let it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -89,6 +89,17 @@ class Timing:
             exact = exact or over <= 1.0
             slower *= 1.001 * max(over, 1.0)
         return q
+
+
+def least_time(figure: Figure, path: Sequence[Array], pace: Pace) -> float:
+    """Seconds that no motion along a path of postures (nq,) is sooner than, as joints rest where they turn back."""
+    most, limit = 0.0, pace.acceleration
+    for steps, speed in zip(np.diff(places(figure.model, path), axis=0).T, pace.fastest(figure), strict=True):
+        way = np.sign(steps)
+        runs = np.bincount(np.cumsum(np.diff(way, prepend=way[:1]) != 0.0), np.abs(steps), 1)
+        cruised = runs > speed**2 / limit
+        most = max(most, float(np.where(cruised, runs / speed + speed / limit, 2.0 * np.sqrt(runs / limit)).sum()))
+    return most
 
 
 class Use(NamedTuple):
