@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
@@ -70,21 +70,9 @@ class Sampler:
         for joint in self._loose:
             away[joint.idx_v : joint.idx_v + 3] = self._loosely(q, joint, spread)
         if self._held:  # a random share of the freedoms stays, so that not all of a body wanders on the way
-            away[self._staying()] = 0.0
+            away[rng.uniform(size=model.nv) > rng.uniform()] = 0.0
         away[self._frozen] = 0.0
         return np.asarray(pin.integrate(model, q, away))
-
-    def _staying(self) -> Mask:
-        """Random freedoms (nv,): all but those of a limb, or a random share of all."""
-        model, rng = self._figure.model, self._rng
-        stays: Mask = rng.uniform(size=model.nv) > rng.uniform()
-        if rng.uniform() < 0.5:
-            above = model.supports[int(rng.integers(1, model.njoints))]
-            moving = [model.joints[j] for j in model.subtrees[above[int(rng.integers(1, len(above)))]]]
-            stays = np.ones(model.nv, dtype=bool)
-            for joint in moving:
-                stays[joint.idx_v : joint.idx_v + joint.nv] = False
-        return stays
 
     def _loosely(self, q: Array, joint: Any, spread: float) -> Array:
         """A random motion (3,) of a planar joint, which is a root on a floor, or of a ball joint."""
