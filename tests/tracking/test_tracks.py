@@ -53,7 +53,7 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         ),
         (lambda lines: [line.partition(",")[2] for line in lines], "line 1: the columns lack time"),
         (lambda lines: [line.replace(".", "\0").replace(",", ";").replace("\0", ",") for line in lines], "semicolons"),
-        (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values and not 26"),
+        (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 29 values and not 28"),
         (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is no number"),
         (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
         (lambda lines: lines[:2], "line 2: .*at least two frames"),

@@ -35,9 +35,10 @@ class Pool(Generic[T]):
 
 
 class Pooled:
-    """Base of what any number of runs share, and find objects of their own at: it sets `_pools` to an empty dict."""
+    """What any number of runs share, and find objects of their own at."""
 
-    _pools: dict[Any, Pool[Any]]
+    def __init__(self) -> None:
+        self._pools: dict[Any, Pool[Any]] = {}
 
     def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
         """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""

@@ -32,7 +32,7 @@ def _joints_of(names: Sequence[str], prefix: str) -> range:
 copyreg.pickle(pin.Model, archived)
 
 
-class Figure(checks.FixedAttributes, Pooled):
+class Figure(checks.FixedAttributes):
     """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
     It never changes, so any number of scenes and threads may share one. It can be pickled and copied. Methods that take
@@ -69,6 +69,7 @@ class Figure(checks.FixedAttributes, Pooled):
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
+        runs: objects that runs on any of its scenes borrow.
 
     Examples:
         >>> human.joint_values(standing)["left_elbow_flexion"] >= 0.0
@@ -107,7 +108,7 @@ class Figure(checks.FixedAttributes, Pooled):
         self.mount: Mount | None = None
         self.members = MappingProxyType(dict(description.members))
         self._states = Pool(lambda: State(model), at_most=2)  # 6.5 MB for 55 freedoms, 27 MB for 95
-        self._pools = {}
+        self.runs = Pooled()
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None

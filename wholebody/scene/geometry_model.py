@@ -112,7 +112,7 @@ class SceneGeometry(Pooled):
         self.moves = 0
         self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
         self._put_at: dict[str, int] = {}
-        self._pools = {}
+        super().__init__()
         self._known: OrderedDict[Any, Any] = OrderedDict()
 
     def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:

@@ -66,7 +66,7 @@ def test_a_start_whose_holds_are_far_off_comes_back_to_them(standing, seed):
 
 
 @pytest.mark.parametrize(
-    ("target", "left", "most"), [((0.2, -0.3, 2.585), 0.3104, 190), ((2.2, -1.5, 1.0), 1.2386, 190)]
+    ("target", "left", "most"), [((0.2, -0.3, 2.585), 0.3104, 240), ((2.2, -1.5, 1.0), 1.2386, 240)]
 )
 def test_what_is_out_of_reach_is_known_soon(standing, honest, target, left, most):
     """The work is counted in programs; it was 279, and 239 while ends with feet off by mm did not count."""

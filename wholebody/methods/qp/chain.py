@@ -23,7 +23,7 @@ from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
-from wholebody.tasks.base import Constraint
+from wholebody.tasks.base import Constraint, Goal
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
 
@@ -54,7 +54,7 @@ class Met(NamedTuple):
 def chains_of(problem: Problem) -> Pool[Chains]:
     """What runs on problems of a figure borrow: things around it change no chain."""
     figure = problem.scene.figure
-    return figure.pool(Chains, lambda: Chains(figure.model, figure.limits))
+    return figure.runs.pool(Chains, lambda: Chains(figure.model, figure.limits))
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
@@ -62,7 +62,9 @@ def goal_entries(problem: Problem) -> list[Entry] | None:
     if not problem.goals or any(type(one) is not tasks.Freeze for one in problem.bounds):
         return None
     found: list[Entry] = []
-    for term in (*problem.goals, *(one for one in problem.constraints if np.any(one.lower == one.upper))):
+    equal = [one for one in problem.constraints if np.any(one.lower == one.upper)]
+    terms: tuple[Goal | Constraint, ...] = (*problem.goals, *equal)
+    for term in terms:
         entries = entries_of(term, problem.scene.model)
         if entries is None or any(entry.table not in (RESIDUAL, AXIS) for entry in entries):
             return None
