@@ -194,6 +194,62 @@ def test_an_end_that_an_inequality_forbids_is_rejected(arm):
     assert solution.assessment.measure >= free.assessment.measure
 
 
+def test_ends_with_frozen_joints_are_of_least_effort(arm):
+    """No limit holds what is frozen: neither does the effort pull it off, nor are other joints left at theirs."""
+    rng, limits = np.random.default_rng(1), arm.limits
+    for joint in arm.joints:
+        start, there = rng.uniform(limits.lower, limits.upper, (2, len(limits.lower)))
+        there[arm.dofs([joint])] = start[arm.dofs([joint])]
+        goal = wb.Point("tip", place_of(arm, there, "tip").translation)
+        problem = wb.Problem(wb.Scene(arm), start, goals=[goal], constraints=[wb.Freeze(joint)])
+        met = found(problem, measures=True)
+        assert met.stationary, joint
+        assert wb.assess(problem, met.q).optimality < 1e-4, joint
+
+
+class Root(wb.Constraint):
+    """A square root of how far the shoulder is from an angle, no number beyond."""
+
+    lower, upper = np.zeros(1), np.full(1, np.inf)
+
+    def value(self, state):
+        return np.array([0.8 - state.q[1]]) ** 0.5
+
+    def jacobian(self, state):
+        return np.array([[0.0, -0.5 / max(0.8 - state.q[1], 1e-9) ** 0.5, 0.0, 0.0, 0.0, 0.0]])
+
+
+class Barrier(wb.Measure):
+    """A logarithm of that, no number beyond, and the square of all angles."""
+
+    def value(self, state):
+        return float(state.q @ state.q - np.log(0.8 - state.q[1]))
+
+    def gradient(self, state):
+        return 2.0 * state.q + np.eye(6)[1] / (0.8 - state.q[1])
+
+    def curvature(self, state):
+        return np.full(6, 2.0)
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("terms", [{"constraints": [Root()]}, {"measures": [Barrier()]}])
+def test_ends_where_a_term_of_ones_own_is_undefined_are_no_answers(arm, terms):
+    """Witnesses are defined; a descent from the start finds about as little effort as from seeds."""
+    rng, limits = np.random.default_rng(0), arm.limits
+    for _ in range(8):
+        there = rng.uniform(limits.lower, limits.upper)
+        there[1] = min(there[1], 0.79)
+        problem = wb.Problem(
+            wb.Scene(arm), START, goals=[wb.Point("tip", place_of(arm, there, "tip").translation)], **terms
+        )
+        solution = wb.methods.QP().solve(problem)
+        assert solution.solved, solution.message
+        assert solution.q[1] <= 0.8
+        end = next(iter(wb.methods.QP().minima(problem, [START])))
+        assert not end.solved or solution.assessment.measure <= 1.2 * end.assessment.measure
+
+
 def test_where_all_ends_of_least_effort_are_blocked_one_of_more_effort_is_found():
     """Of what reaches into a shelf, ends of least effort come from below, through a board."""
     rng, reached = np.random.default_rng(3), 0

@@ -23,7 +23,9 @@ from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
-from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.answers import is_own
+from wholebody.tasks.base import Constraint, Goal, Measure
+from wholebody.tasks.checks import undefined
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
 
@@ -81,7 +83,8 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         chain = chains.carrying(entries)
         if chain is None:
             return None
-        chain = chain.still(problem.scene.figure.clamp(problem.start), frozen(problem, workspace))
+        if problem.bounds:
+            chain = chain.still(problem.scene.figure.clamp(problem.start), frozen(problem, workspace))
         distance = distance_of(problem, chain) if settings.measures else None
         asked = Asked.by(problem, chain, entries, distance)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
@@ -104,6 +107,7 @@ class Asked(NamedTuple):
     nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
     clearances: Array  # (pairs,) metres
     bounded: tuple[Constraint, ...] = ()  # inequalities, which reject ends
+    own: tuple[Constraint | Measure, ...] = ()  # terms of one's own, which may be undefined at some postures
 
     @classmethod
     def by(cls, problem: Problem, chain: PlainChain, entries: list[Entry], distance: SquaredDistance | None) -> Asked:
@@ -114,7 +118,8 @@ class Asked(NamedTuple):
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
         bounded = tuple(one for one in problem.constraints if not np.any(one.lower == one.upper))
-        return cls(chain.goals(entries), at, nearest, problem.clearances, bounded)
+        own = tuple(filter(is_own, (*problem.constraints, *problem.measures)))
+        return cls(chain.goals(entries), at, nearest, problem.clearances, bounded, own)
 
 
 def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
@@ -214,7 +219,7 @@ class Descents:
 
     def _along_branches(self, branches: Branches, most: float) -> Array | None:
         """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
-        goals, at, nearest, clearances, bounded = self.asked
+        goals, at, nearest, clearances, bounded, _ = self.asked
         if bounded:
             return None  # intervals of branches end where things are in the way, and not where inequalities do
         asked = how_far(self.settings, 1, others=True)
@@ -227,7 +232,7 @@ class Descents:
 
     def _is_out_of_reach(self) -> bool:
         """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
-        chain, (goals, at, _, clearances, _) = self.chain, self.asked
+        chain, (goals, at, _, clearances, *_) = self.chain, self.asked
         if self.settings.tolerance > NEARBY:
             return False  # postures farther from the goal would do
         found = chain.loosely_met(goals, self.settings.seed)
@@ -292,6 +297,8 @@ class Descents:
                 # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
                 free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
+            if not self._is_defined(q):
+                return Met(self.asked.at, tuple(self.trace), False)  # descents from the start end at the edge
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
 
@@ -300,11 +307,17 @@ class Descents:
         return float(self.asked.nearest[1].dot(away * away))
 
     def _is_free(self, q: Array) -> bool:
-        if not is_free(self.workspace, q, self.asked.clearances, self.within):
+        if not (is_free(self.workspace, q, self.asked.clearances, self.within) and self._is_defined(q)):
             return False
+        if not self.asked.bounded:
+            return True
         state, slack = self.workspace.state.update(q), self.settings.tolerance
         values = ((one, one.value(state)) for one in self.asked.bounded)
         return all(np.all((one.lower - slack <= at) & (at <= one.upper + slack)) for one, at in values)
+
+    def _is_defined(self, q: Array) -> bool:
+        own = self.asked.own
+        return not own or undefined(own, self.workspace.state.update(q)) is None
 
 
 def how_far(settings: Settings, enough: int, others: bool = False) -> Array:

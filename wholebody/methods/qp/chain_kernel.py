@@ -273,7 +273,7 @@ def _held_wrongly(chain: Chain, room: Room, q: Array, dq: Array, nearest: Array,
     """The held joint that the effort pulls most away from its limit; -1 where there is none."""
     worst, most = -1, 1e-6
     for i in range(len(q)):
-        if not room.free[i]:
+        if not room.free[i] and chain.lower[i] < chain.upper[i]:  # a frozen one is held by no limit
             slope = nearest[1, i] * (q[i] + dq[i] - nearest[0, i])
             for r in range(len(multipliers)):
                 slope += room.jacobian[r, i] * multipliers[r]
