@@ -332,9 +332,10 @@ def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
         columns[k, 1] = joints[c, 3, 2] * x - joints[c, 3, 0] * z
         columns[k, 2] = joints[c, 3, 0] * y - joints[c, 3, 1] * x
     residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
-    for row in goals.axis_entries[:, 0]:
-        room.wrench[row : row + 2] = 0.0  # of a direction no force is written
-    axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)
+    if len(goals.axis_entries):
+        for row in goals.axis_entries[:, 0]:
+            room.wrench[row : row + 2] = 0.0  # of a direction no force is written
+        axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)
 
 
 @compiled(error_model="numpy")
@@ -349,7 +350,7 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
     for e in range(len(axes)):
         for r in range(axes[e, 0], axes[e, 0] + 2):
             for k in range(len(room.columns)):
-                room.jacobian[r, k] = dot(room.wrench[r], room.columns[k]) if support[axes[e, 1], k] != 0 else 0.0
+                room.jacobian[r, k] = support[axes[e, 1], k] * dot(room.wrench[r], room.columns[k])
 
 
 @compiled(error_model="numpy", nogil=True)
@@ -370,8 +371,7 @@ def reach_all(
         counts: (k,) of given seeds; written: of those that were taken, -1 for more than there is room for.
     """
     chain, arm, room = bodies
-    tables, alike = goals
-    size, most, limits = len(chain.lower), ends.shape[1], (chain.lower, chain.upper)
+    (tables, alike), size, most, limits = goals, len(chain.lower), ends.shape[1], (chain.lower, chain.upper)
     branch, effort = np.empty((samples[1], BRANCHES, size)), np.empty((samples[1], BRANCHES))
     every = most + samples[1] * BRANCHES
     order, seeds = np.empty(samples[1] * BRANCHES, dtype=np.intp), np.empty((every, size))
