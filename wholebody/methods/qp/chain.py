@@ -184,7 +184,8 @@ class Descents:
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
                 # An end of an exact arm that did not come to rest at its limits takes at most a per cent more.
-                return met if self.chain.arm is None else with_values(met, blocked=None, stationary=self.measured)
+                settled = self.chain.arm is not None and not self.asked.bounded
+                return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if first is None:
@@ -291,8 +292,8 @@ class Descents:
             q = chain.posture(seeds[k], self.asked.at)
             if self._is_free(q):
                 known = bool(ends[k][2]) and (self.measured or not self.settings.measures)
-                # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
-                free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
+                # Where goals leave no joint free ends are isolated: no descent leads out of what blocks it.
+                free = self.least < SEEDS.worth * effort and self._is_redundant()
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             if not self._is_defined(q):
                 return Met(self.asked.at, tuple(self.trace), False)  # descents from the start end at the edge
@@ -309,6 +310,11 @@ class Descents:
         state, slack = self.workspace.state.update(q), self.settings.tolerance
         values = ((one, one.value(state)) for one in self.asked.bounded)
         return all(np.all((one.lower - slack <= at) & (at <= one.upper + slack)) for one, at in values)
+
+    def _is_redundant(self) -> bool:
+        """Whether joints move where the goals are met: rows of several terms may be the same."""
+        rows = self.chain.room(self.rule.rows).jacobian  # at the last end
+        return len(self.start) > len(rows) or bool(np.linalg.matrix_rank(rows, 1e-3) < len(self.start))  # m, rad a rad
 
     def _is_defined(self, q: Array) -> bool:
         own = self.asked.own
