@@ -24,7 +24,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import Constraint, Measure
+from wholebody.tasks.base import Constraint, Term
 from wholebody.tasks.checks import undefined
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
@@ -104,7 +104,7 @@ class Asked(NamedTuple):
     nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
     clearances: Array  # (pairs,) metres
     bounded: tuple[Constraint, ...] = ()  # inequalities, which reject ends
-    own: tuple[Constraint | Measure, ...] = ()  # terms of one's own, which may be undefined at some postures
+    own: tuple[Term, ...] = ()  # terms of one's own, which may be undefined at some postures
 
     @classmethod
     def by(cls, problem: Problem, chain: PlainChain, entries: list[Entry], distance: SquaredDistance | None) -> Asked:
@@ -115,7 +115,7 @@ class Asked(NamedTuple):
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
         bounded = tuple(one for one in problem.constraints if not np.any(one.lower == one.upper))
-        own = tuple(filter(is_own, (*problem.constraints, *problem.measures)))
+        own = tuple(one for one in (*problem.constraints, *problem.measures) if is_own(one))
         return cls(chain.goals(entries), at, nearest, problem.clearances, bounded, own)
 
 
