@@ -210,6 +210,22 @@ def test_arms_of_seven_joints_turn_out_of_what_an_inequality_rejects():
             assert wb.solve(problem).assessment.measure <= 1.1 * least
 
 
+def test_the_closest_posture_within_an_inequality_is_sought_along_it():
+    """A tool is asked for in the middle of a ball: no posture is nearer than 0.1 m, and some hardly farther."""
+    figure, start = robots.known_arm("ur5")
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        there = np.clip(rng.uniform(-2.0, 2.0, 6), figure.limits.lower, figure.limits.upper)
+        tool, frame = place_of(figure, there, "tool"), list(figure.frames)[len(figure.frames) // 2]
+        scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=tuple(tool.translation))
+        low = tuple(place_of(figure, there, frame).translation - (0.0, 0.0, 0.01))
+        above = wb.Plane(frame, (0, 0, 1), point=low, side="above")
+        solution = wb.solve(wb.Problem(scene, start, goals=[wb.Frame("tool", tool)], constraints=[above]))
+        assert solution.status == "unreachable"
+        assert "contradicts itself" in solution.message
+        assert 0.0999 <= solution.assessment.goal_errors[0] <= 0.12
+
+
 def test_rows_that_are_the_same_leave_joints_free():
     """A rotation that is asked for and held too leaves an arm of seven joints as much room as one of them."""
     figure, start = robots.known_arm("panda")

@@ -172,7 +172,8 @@ class Descents:
                 others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
-                return self._nearest() if self._is_out_of_reach() else None
+                # Inequalities reject what is nearest: the search for the closest posture goes along them.
+                return self._nearest() if not self.asked.bounded and self._is_out_of_reach() else None
             unsettled = met is not None and self.measured and not met.stationary  # as limits are near
             if (met is not None and met.blocked is None and not unsettled) or finite or self.control.over:
                 return met
