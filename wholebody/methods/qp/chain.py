@@ -81,7 +81,8 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         chain = chains.carrying(entries)
         if chain is None:
             return None
-        chain = chain.still(problem.scene.figure.clamp(problem.start), frozen(problem, workspace))
+        if problem.bounds:
+            chain = chain.still(problem.scene.figure.clamp(problem.start), frozen(problem, workspace))
         distance = distance_of(problem, chain) if settings.measures else None
         asked = Asked.by(problem, chain, entries, distance)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
@@ -308,6 +309,8 @@ class Descents:
     def _is_free(self, q: Array) -> bool:
         if not (is_free(self.workspace, q, self.asked.clearances, self.within) and self._is_defined(q)):
             return False
+        if not self.asked.bounded:
+            return True
         state, slack = self.workspace.state.update(q), self.settings.tolerance
         values = ((one, one.value(state)) for one in self.asked.bounded)
         return all(np.all((one.lower - slack <= at) & (at <= one.upper + slack)) for one, at in values)
