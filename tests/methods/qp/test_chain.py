@@ -194,6 +194,57 @@ def test_an_end_that_an_inequality_forbids_is_rejected(arm):
     assert solution.assessment.measure >= free.assessment.measure
 
 
+def test_arms_of_seven_joints_turn_out_of_what_an_inequality_rejects():
+    """Descents from the start, from a posture that meets all and from random ones end at no less effort."""
+    figure, start = robots.known_arm("iiwa7")
+    rng, limits = np.random.default_rng(0), (figure.limits.lower, figure.limits.upper)
+    for _ in range(12):
+        there, others = rng.uniform(*limits), rng.uniform(*limits, (4, 7))
+        elbow = tuple(place_of(figure, there, "link4").translation - (0.0, 0.0, 0.005))
+        goal = wb.Frame("tool", place_of(figure, there, "tool"))
+        above = wb.Plane("link4", (0, 0, 1), point=elbow, side="above")
+        problem = wb.Problem(wb.Scene(figure), start, goals=[goal], constraints=[above])
+        ends = [end for end in wb.methods.QP().minima(problem, [start, there, *others]) if end.solved]
+        if ends:
+            least = min(end.assessment.measure for end in ends)
+            assert wb.solve(problem).assessment.measure <= 1.1 * least
+
+
+def test_the_closest_posture_within_an_inequality_is_sought_along_it():
+    """A tool is asked for in the middle of a ball: no posture is nearer than 0.1 m, and some hardly farther."""
+    figure, start = robots.known_arm("ur5")
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        there = np.clip(rng.uniform(-2.0, 2.0, 6), figure.limits.lower, figure.limits.upper)
+        tool, frame = place_of(figure, there, "tool"), list(figure.frames)[len(figure.frames) // 2]
+        scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=tuple(tool.translation))
+        low = tuple(place_of(figure, there, frame).translation - (0.0, 0.0, 0.01))
+        above = wb.Plane(frame, (0, 0, 1), point=low, side="above")
+        solution = wb.solve(wb.Problem(scene, start, goals=[wb.Frame("tool", tool)], constraints=[above]))
+        assert solution.status == "unreachable"
+        assert "contradicts itself" in solution.message
+        assert 0.0999 <= solution.assessment.goal_errors[0] <= 0.12
+
+
+def test_rows_that_are_the_same_leave_joints_free():
+    """A rotation that is asked for and held too leaves an arm of seven joints as much room as one of them."""
+    figure, start = robots.known_arm("panda")
+    rng, blocked = np.random.default_rng(0), 0
+    for _ in range(29):
+        there = rng.uniform(figure.limits.lower, figure.limits.upper)
+        tool, elbow = place_of(figure, there, "tool"), place_of(figure, there, "link4").translation
+        scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=tuple(elbow + (0.0, 0.0, 0.25)))
+        goals = [wb.Point("tool", tool.translation), wb.Orientation("tool", tool.rotation)]
+        once = wb.Problem(scene, start, goals=goals)
+        twice = wb.Problem(scene, start, goals=goals, constraints=[wb.Hold("tool", at=tool, orientation=False)])
+        met = found(once, measures=True)
+        if met is not None and met.blocked is not None:
+            blocked += 1
+            assert not found(twice, measures=True).complete
+            assert wb.solve(twice).assessment.measure <= 1.01 * wb.solve(once).assessment.measure
+    assert blocked >= 2
+
+
 def test_ends_with_frozen_joints_are_of_least_effort(arm):
     """No limit holds what is frozen: neither does the effort pull it off, nor are other joints left at theirs."""
     rng, limits = np.random.default_rng(1), arm.limits

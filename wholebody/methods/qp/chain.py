@@ -24,7 +24,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import Constraint, Goal, Measure
+from wholebody.tasks.base import Constraint, Goal, Term
 from wholebody.tasks.checks import undefined
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
@@ -107,7 +107,7 @@ class Asked(NamedTuple):
     nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
     clearances: Array  # (pairs,) metres
     bounded: tuple[Constraint, ...] = ()  # inequalities, which reject ends
-    own: tuple[Constraint | Measure, ...] = ()  # terms of one's own, which may be undefined at some postures
+    own: tuple[Term, ...] = ()  # terms of one's own, which may be undefined at some postures
 
     @classmethod
     def by(cls, problem: Problem, chain: PlainChain, entries: list[Entry], distance: SquaredDistance | None) -> Asked:
@@ -118,7 +118,7 @@ class Asked(NamedTuple):
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
         bounded = tuple(one for one in problem.constraints if not np.any(one.lower == one.upper))
-        own = tuple(filter(is_own, (*problem.constraints, *problem.measures)))
+        own = tuple(one for one in (*problem.constraints, *problem.measures) if is_own(one))
         return cls(chain.goals(entries), at, nearest, problem.clearances, bounded, own)
 
 
@@ -175,7 +175,8 @@ class Descents:
                 others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
-                return self._nearest() if self._is_out_of_reach() else None
+                # Inequalities reject what is nearest: the search for the closest posture goes along them.
+                return self._nearest() if not self.asked.bounded and self._is_out_of_reach() else None
             unsettled = met is not None and self.measured and not met.stationary  # as limits are near
             if (met is not None and met.blocked is None and not unsettled) or finite or self.control.over:
                 return met
@@ -187,7 +188,8 @@ class Descents:
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
                 # An end of an exact arm that did not come to rest at its limits takes at most a per cent more.
-                return met if self.chain.arm is None else with_values(met, blocked=None, stationary=self.measured)
+                settled = self.chain.arm is not None and not self.asked.bounded
+                return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if first is None:
@@ -294,8 +296,8 @@ class Descents:
             q = chain.posture(seeds[k], self.asked.at)
             if self._is_free(q):
                 known = bool(ends[k][2]) and (self.measured or not self.settings.measures)
-                # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
-                free = len(self.start) > self.rule.rows and self.least < SEEDS.worth * effort
+                # Where goals leave no joint free ends are isolated: no descent leads out of what blocks it.
+                free = self.least < SEEDS.worth * effort and self._is_redundant()
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             if not self._is_defined(q):
                 return Met(self.asked.at, tuple(self.trace), False)  # descents from the start end at the edge
@@ -314,6 +316,11 @@ class Descents:
         state, slack = self.workspace.state.update(q), self.settings.tolerance
         values = ((one, one.value(state)) for one in self.asked.bounded)
         return all(np.all((one.lower - slack <= at) & (at <= one.upper + slack)) for one, at in values)
+
+    def _is_redundant(self) -> bool:
+        """Whether joints move where the goals are met: rows of several terms may be the same."""
+        rows = self.chain.room(self.rule.rows).jacobian  # at the last end
+        return len(self.start) > len(rows) or bool(np.linalg.matrix_rank(rows, 1e-3) < len(self.start))  # m, rad a rad
 
     def _is_defined(self, q: Array) -> bool:
         own = self.asked.own
