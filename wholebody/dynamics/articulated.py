@@ -34,6 +34,7 @@ from wholebody.dynamics.touching import Touching
 from wholebody.figures.state import free_roots
 from wholebody.scene.scene import Scene
 
+CREEPS = 1e-4  # m/s, as `STILL`, of a figure that springs or dampers lead to where it is to stay
 LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
 FAR = 0.15  # rad: gaps are not linear in a step that turns a piece by more
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
@@ -98,7 +99,9 @@ class Articulated:
             now, left = now + step, left - step
             self.ends.append(now)
         self._tracked = np.array(tracked)
-        slow = np.abs(self.velocity).max(initial=0.0) < 1.0 and self._touching.fastest(self.q, self.velocity) < STILL
+        # springs and dampers lead to their ends ever more slowly
+        still = STILL if len(self._old.pair) and not self.stiffness.any() else CREEPS
+        slow = np.abs(self.velocity).max(initial=0.0) < 1.0 and self._touching.fastest(self.q, self.velocity) < still
         self._slow_for = self._slow_for + dt if slow else 0.0
 
     def _rests(self, tracked: Array, dt: float, moved: Moved, segments: Mapping[str, int]) -> bool:
@@ -108,7 +111,8 @@ class Articulated:
         """
         engine, pulled = self._engine, self._driven and bool((tracked != self._tracked).any())
         floats = len(self._roots) > 0 and not len(self._old.pair)
-        if self._slow_for < AFTER or moved or pulled or floats or self._touching.awake(self._beside):
+        self._slow_for = 0.0 if moved or pulled else self._slow_for  # one frame says little of how it goes on
+        if self._slow_for < AFTER or floats or self._touching.awake(self._beside):
             return False
         back = None if engine is None else engine.way_back()
         frame = None if engine is None else engine.advance(dt, yielding=segments)

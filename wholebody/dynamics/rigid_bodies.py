@@ -234,7 +234,10 @@ class RigidBodies:
         """Points at which bodies with these names, and those that touch them in turn, can touch other things."""
         linked = np.zeros(len(self.names), dtype=bool)
         linked[[self._number(name) for name in checks.listed(names, "names", "['ball']")]] = True
-        return self._finder.points(self._near).linked(linked, self._pieces.dynamic, self._things, 2.0 * SKIN)
+        near, (position, rotation, active) = self._near, self._found
+        if (linked & ~active).any():  # what bears those that sleep was not looked at
+            near = self._finder.near(position, rotation, self._margin, active | self._pieces.dynamic)
+        return self._finder.points(near).linked(linked, self._pieces.dynamic, self._things, 2.0 * SKIN)
 
     def way_back(self) -> Callable[[], None]:
         """A function that takes back what is advanced from now on."""

@@ -12,7 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import number, posture, shown, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
-from wholebody.geometry.continuous.passing_through import GRAZE, is_free
+from wholebody.geometry.continuous.passing_through import GRAZE, INSIDE, is_free
 from wholebody.methods.base import Method, Step, Tracker, goal_error, judged
 from wholebody.methods.control import BUDGET, budget_for_sweep, within_budget
 from wholebody.methods.newton.assembly import Assembly
@@ -149,16 +149,22 @@ class ProblemDrag:
         # m: depth of an overlap that the tracker itself does not lead out of
         deep = 0.0 if self.tracker.leaves_overlap else self.workspace.deepest(self.q)
         deep = deep if deep > GRAZE else 0.0
+        found: Array | None = None
         for step in self._frames():
             spent, q = spent + step.iterations, step.q
-            q = shortened(self.problem.scene.model, self.q, q, self._fastest)
-            if self._is_free(q, self.tracker.unswept) and (not deep or self.workspace.deepest(q) <= GRAZE):
-                self.q = q
+            part = shortened(self.problem.scene.model, self.q, q, self._fastest)
+            if not (self._is_free(part, self.tracker.unswept) and (not deep or self.workspace.deepest(part) <= GRAZE)):
+                tried.append(part)
+                continue
+            # a part of a motion leads through what its end is beside; the motion to a nearer goal may be whole
+            rubs = part is not q and self.workspace.deepest(part) > INSIDE
+            found = part if found is None or not rubs else found
+            if not rubs:
                 break
-            tried.append(q)
-        else:
-            if deep:
-                self._leave(tried, deep)
+        if found is not None:
+            self.q = found
+        elif deep:
+            self._leave(tried, deep)
         return spent
 
     def _frames(self) -> Iterator[Step]:
