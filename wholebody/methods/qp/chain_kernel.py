@@ -75,7 +75,9 @@ def reach(
         How many seeds were taken.
     """
     tolerance, most, enough = asked[0], int(asked[2]), asked[3]
-    weighed, best = nearest[1].max() > 0.0, np.inf
+    weighed, best = False, np.inf
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
     for k in range(len(seeds)):
         q = seeds[k]
         if weighed and asked[4] > 0.0 and expected[k] > HARDLY * best:
