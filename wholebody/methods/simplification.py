@@ -14,7 +14,6 @@ from wholebody.assessment.posture import assess
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask, brief, with_values
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import COAL_ACCURACY
 from wholebody.geometry.proximity import PairTable
@@ -250,11 +249,11 @@ def still_dofs(problem: Problem) -> list[int]:
     """Degrees of freedom (tangent indices) that the bounds of a problem keep as at the start."""
     if not problem.bounds:
         return []
-    state = State(problem.scene.model).update(problem.start)
     still = np.zeros(problem.scene.model.nv, dtype=bool)
-    for bound in problem.bounds:
-        low, high = bound.bounds(state, None)
-        still |= (low == 0.0) & (high == 0.0)
+    with problem.scene.figure.posed(problem.start) as state:
+        for bound in problem.bounds:
+            low, high = bound.bounds(state, None)
+            still |= (low == 0.0) & (high == 0.0)
     return [int(dof) for dof in np.flatnonzero(still)]
 
 

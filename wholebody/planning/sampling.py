@@ -11,13 +11,14 @@ from wholebody.base.arrays import Array
 from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
+from wholebody.tasks.checks import is_equality
 
 ROOM = 1.0  # m: by which samples move a free root along each axis
 
 
 def holds(problem: Problem) -> bool:
     """Whether a constraint is an equality, such as a `Hold`, so that most postures near by are not allowed."""
-    return any(bool(np.any(term.lower == term.upper)) for term in problem.constraints)
+    return any(map(is_equality, problem.constraints))
 
 
 class Sampler:

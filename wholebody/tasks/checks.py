@@ -48,6 +48,11 @@ def is_a(term: object, kinds: type[T] | tuple[type[T], ...]) -> TypeGuard[T]:
     return _derives(kind, asked)
 
 
+def is_equality(term: Constraint) -> bool:
+    """Whether a row of a constraint is an equality, as those of `Hold` are."""
+    return bool(np.any(term.lower == term.upper))
+
+
 @lru_cache(maxsize=256)
 def _derives(kind: Any, kinds: Any) -> bool:
     return issubclass(kind, kinds)

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import tasks
-from wholebody.base.arrays import Array, Mask, with_values
+from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
 from wholebody.methods.qp.along_branches import Along
@@ -20,12 +20,13 @@ from wholebody.methods.qp.chain_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain, rows_of
 from wholebody.methods.qp.settings import SEEDS, Settings
+from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Constraint, Goal, Term
-from wholebody.tasks.checks import undefined
+from wholebody.tasks.checks import is_equality, undefined
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
 
@@ -64,8 +65,7 @@ def goal_entries(problem: Problem) -> list[Entry] | None:
     if not problem.goals or any(type(one) is not tasks.Freeze for one in problem.bounds):
         return None
     found: list[Entry] = []
-    equal = [one for one in problem.constraints if np.any(one.lower == one.upper)]
-    terms: tuple[Goal | Constraint, ...] = (*problem.goals, *equal)
+    terms: tuple[Goal | Constraint, ...] = (*problem.goals, *filter(is_equality, problem.constraints))
     for term in terms:
         entries = entries_of(term, problem.scene.model)
         if entries is None or any(entry.table not in (RESIDUAL, AXIS) for entry in entries):
@@ -83,20 +83,11 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         chain = chains.carrying(entries)
         if chain is None:
             return None
-        if problem.bounds:
-            chain = chain.still(problem.scene.figure.clamp(problem.start), frozen(problem, workspace))
+        chain = chain.still(problem.scene.figure.clamp(problem.start), still_dofs(problem))
         distance = distance_of(problem, chain) if settings.measures else None
         asked = Asked.by(problem, chain, entries, distance)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
         return Descents(asked, chain, rule, workspace, settings, control).run()
-
-
-def frozen(problem: Problem, workspace: Workspace) -> Mask:
-    """Which degrees of freedom (nv,) stay as they are at the start."""
-    still = np.zeros(problem.scene.model.nv, dtype=bool)
-    for one in problem.bounds:
-        still |= one.bounds(workspace.state, None)[1] == 0.0
-    return still
 
 
 class Asked(NamedTuple):
@@ -117,7 +108,7 @@ class Asked(NamedTuple):
         nearest[0] = chain.angles(at if distance is None else distance.reference)
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
-        bounded = tuple(one for one in problem.constraints if not np.any(one.lower == one.upper))
+        bounded = tuple(one for one in problem.constraints if not is_equality(one))
         own = tuple(one for one in (*problem.constraints, *problem.measures) if is_own(one))
         return cls(chain.goals(entries), at, nearest, problem.clearances, bounded, own)
 

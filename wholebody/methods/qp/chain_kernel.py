@@ -332,7 +332,7 @@ def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
         columns[k, 1] = joints[c, 3, 2] * x - joints[c, 3, 0] * z
         columns[k, 2] = joints[c, 3, 0] * y - joints[c, 3, 1] * x
     residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
-    if len(goals.axis_entries) > 0:  # the room that axes take costs a fifth of a descent
+    if len(goals.axis_entries) > 0:  # their arrays take time in every descent
         for row in goals.axis_entries[:, 0]:
             room.wrench[row : row + 2] = 0.0  # of a direction no force is written
         axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)

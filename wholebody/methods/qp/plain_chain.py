@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices, Mask, with_values
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import branch_kernel, chain_kernel
@@ -76,9 +76,11 @@ class PlainChain:
         self.samples = (1, 1) if self.held < 0 else (SEEDS.samples, SEEDS.finer)
         self.first = int(self.held >= 0 or (self.arm is None and self.guide is not None))
 
-    def still(self, q: Array, frozen: Mask) -> PlainChain:
-        """The chain whose joints among `frozen` (nv,) stay as at a posture (nq,), then without a closed form."""
-        held = frozen[self.idx_v]
+    def still(self, q: Array, frozen: list[int]) -> PlainChain:
+        """The chain whose joints among `frozen` (tangent) stay as at a posture (nq,), then without a closed form."""
+        if not frozen:
+            return self
+        held = np.isin(self.idx_v, frozen)
         if not held.any():
             return self
         made, values, own = copy(self), self.angles(q), self.chain
