@@ -34,6 +34,7 @@ class StandInFigure:
             idx_q=idx_v + 1, idx_v=idx_v, lower=np.full(idx_v.size, -1.6), upper=np.full(idx_v.size, 2.1)
         )
         self.cones: dict[str, Any] = {}
+        self.postures = ("standing",)
 
     def warn_of_angles(self, q: Any, what: str) -> bool:
         return False
@@ -98,7 +99,8 @@ def humanoid() -> Any:
     model.addFrame(pin.Frame("tip", model.getJointId("larm_wrist2_joint"), 0, tip, pin.FrameType.OP_FRAME))
     figure = StandInFigure(model)
     built = SimpleNamespace(moves=0, known=lambda key, make: make())
-    return SimpleNamespace(figure=figure, model=model, geometry=geometry, built=built)
+    owner = tuple(piece.name for piece in geometry.geometryObjects)
+    return SimpleNamespace(figure=figure, model=model, geometry=geometry, built=built, piece_owner=owner)
 
 
 @pytest.fixture

@@ -24,6 +24,11 @@ Where the thighs are as far apart as they go, the trunk rises from them: hips, p
 _TRUNK = {"lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"}
 
 
+def zero(figure: Articulated) -> Array:
+    """(nq,) a robot's zero, in which its soles are level; its first posture may have had to evade itself."""
+    return np.array(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
+
+
 def stand(figure: Articulated, degrees: Mapping[str, float]) -> Array:
     """Posture (nq,) of a row of `named_angles`: pelvis above the origin, lowest piece on z = 0, no overlap."""
     q = pin.neutral(figure.model)

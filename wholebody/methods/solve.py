@@ -144,6 +144,6 @@ def _warn_if_nothing_holds(problem: Problem, solution: Solution) -> None:
     if flown > 0.3:
         warnings.warn(
             f"nothing holds the figure: its root moved {flown:.2f} m to meet the goals; add "
-            f"wb.Stand(on=...), wb.Hold('{root.removesuffix('root')}left_foot') or wb.Freeze({root!r})",
+            f"wb.Stand(on=..., feet=...), wb.Hold(...) of what stands, or wb.Freeze({root!r})",
             stacklevel=3,
         )

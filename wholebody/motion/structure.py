@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.figures.figure import Figure
+from wholebody.figures.postures import zero
 from wholebody.geometry.pieces import box_corners
 from wholebody.motion.skeleton import UNITS, SkeletonMotion, longest_way
 
@@ -155,7 +156,7 @@ def side_of(name: str) -> int:
 
 def upright(figure: Figure) -> Array:
     """(nq,) a posture with flat soles and straight limbs, looking along x: a robot's zero, if it has one."""
-    q: Array = np.array(figure.posture("zero") if "zero" in figure.postures else figure.neutral)
+    q = zero(figure)
     if figure.root == "free":
         data = figure.model.createData()
         pin.forwardKinematics(figure.model, data, q)

@@ -15,12 +15,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
+from wholebody.figures.postures import zero
 from wholebody.figures.state import State
 from wholebody.geometry.pieces import swept_points
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, filled
-from wholebody.tasks.surfaces import outermost
+from wholebody.tasks.surfaces import ball_under, of_pieces, outermost
 
 STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
@@ -71,22 +72,29 @@ def standing_corners(scene: Scene, q: Array, feet: Sequence[str]) -> tuple[Array
 def _soles_of(scene: Scene, feet: Sequence[str], bearing: Sequence[int]) -> _Soles:
     points, radii, joints, begin, foot = list[Array](), list[float](), list[int](), list[int](), list[int]()
     ellipsoids: list[tuple[int, Any, pin.SE3]] = []
+    pieces = scene.geometry.geometryObjects
     for number, (name, joint) in enumerate(zip(feet, bearing, strict=True)):
         begin.append(len(radii))
-        for piece in scene.geometry.geometryObjects if joint else ():
-            if joint in scene.model.supports[piece.parentJoint]:
-                swept, local = swept_points(piece.geometry), piece.placement
-                if isinf(swept.reach):  # a half-space that a foot carries has no end to stand on
-                    continue
-                if not len(swept.points):
-                    ellipsoids.append((len(radii), piece.geometry, pin.SE3(local)))
-                own = swept.points if len(swept.points) else np.zeros((1, 3))
-                points.append(np.insert(own @ local.rotation.T + local.translation, 3, 1.0, axis=1))
-                radii += [swept.radius] * len(own)
-                joints += [int(piece.parentJoint)] * len(own)
-        foot += [number] * (len(radii) - begin[-1])
-        if len(radii) == begin[-1]:
+        beyond = (k for k, piece in enumerate(pieces) if joint and joint in scene.model.supports[piece.parentJoint])
+        # a half-space that a foot carries has no end to stand on
+        found = [k for k in beyond if not isinf(swept_points(pieces[k].geometry).reach)]
+        if not found:
             raise InputError(f"Balance: {name!r} has no pieces to stand on; name segments with geometry as feet")
+        with scene.figure.posed(zero(scene.figure)) as rest:
+            ball = ball_under(of_pieces(scene, name, found), rest)
+        if ball is not None:
+            points.append(np.append(ball.center, 1.0)[None])
+            radii.append(ball.radius)
+            joints.append(ball.joint)
+        for piece in () if ball else [pieces[k] for k in found]:
+            swept, local = swept_points(piece.geometry), piece.placement
+            if not len(swept.points):
+                ellipsoids.append((len(radii), piece.geometry, pin.SE3(local)))
+            own = swept.points if len(swept.points) else np.zeros((1, 3))
+            points.append(np.insert(own @ local.rotation.T + local.translation, 3, 1.0, axis=1))
+            radii += [swept.radius] * len(own)
+            joints += [int(piece.parentJoint)] * len(own)
+        foot += [number] * (len(radii) - begin[-1])
     carriers, first, of = (np.array(each, dtype=np.intp) for each in (joints, begin, foot))
     return _Soles(carriers, np.concatenate(points), np.array(radii), first, of, ellipsoids)
 

@@ -54,7 +54,7 @@ def find_feet(scene: Scene, feet: Sequence[str], where: str) -> list[Place]:
     if owners and not any(map(exists, feet)):
         named = ", or ".join(str([f"{body}{foot}" for foot in feet]) for body in owners)
         raise InputError(f"{where}: the scene has several figures; name the feet of one, feet={named}")
-    return [find_place(scene, foot, where) for foot in feet]
+    return [find_place(scene, foot, f"{where}, feet={[*feet]}") for foot in feet]
 
 
 def find_base(scene: Scene, name: str | None, moved: str, where: str) -> Place:

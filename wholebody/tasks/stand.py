@@ -23,7 +23,9 @@ from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Facing, Gap, Made, Over, Part, TermOfParts, between, owner_pairs, through
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, face
-from wholebody.tasks.surfaces import Surface, joined, once_by, outermost, segments_beyond, segments_on, surface
+from wholebody.tasks.surfaces import (
+    Surface, ball_under, joined, once_by, outermost, segments_beyond, segments_on, surface,
+)  # fmt: skip
 
 STANCE_WEIGHTS = np.array((60.0, 300.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/m^2, but 1/rad^2 of the angle: ESTIMATE
 
@@ -32,8 +34,9 @@ STANCE_WEIGHTS = np.array((60.0, 300.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/
 class Stand(TermOfParts):
     """Stand with flat soles on a thing; the feet may slide, and the centre of mass stays over them.
 
-    Each sole touches the thing, lies flat on its upper face and has its middle over it. The support polygon is that of
-    the corners of the soles where they are, so it goes with the feet; `Balance` keeps to the feet of the start.
+    Each sole touches the thing, lies flat on its upper face and has its middle over it. A foot that is a ball, as
+    quadrupeds have it, touches the thing in a point and may roll. The support polygon is that of the corners of the
+    soles where they are, so it goes with the feet; `Balance` keeps to the feet of the start.
 
     Attributes:
         on: what it stands on.
@@ -43,8 +46,8 @@ class Stand(TermOfParts):
             the feet are at the start, as people keep it; that is in `keeps` once resolved.
         knees: those of the `feet` that are shanks and kneel: the knee and the foot beyond it touch the thing. So
             ``Stand("floor", feet=shanks, knees=shanks)`` kneels, and with "left_foot" and "right_shank" on one knee.
-        parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
-            the distances of the centre of mass inside the edges [m]; once resolved.
+        parts: of each foot the distance, two angles unless it is a ball, and two rows over the face, which are zero;
+            then, with balance, the distances of the centre of mass inside the edges [m]; once resolved.
 
     Raises:
         InputError: a value of the wrong kind, shape or range.
@@ -100,10 +103,14 @@ class Stand(TermOfParts):
                 # somebody kneels on a shin that is up to 30 mm farther ahead than the ankle
                 lows = [_lows(sole, rest, ahead, 0.03), _lows(end, rest, ahead, STANDING_HEIGHT)]
             else:
-                bears = sole
-                up = rest.frame(place.frame).rotation.T @ UP
-                parts += [Gap(sole, thing, ground), Facing(place, across(up), ground, UP)]
-                lows = [_lows(sole, rest, -UP, STANDING_HEIGHT)]
+                bears, ball = sole, ball_under(sole, rest)
+                parts.append(Gap(sole, thing, ground))
+                if ball is None:
+                    up = rest.frame(place.frame).rotation.T @ UP
+                    parts.append(Facing(place, across(up), ground, UP))
+                    lows = [_lows(sole, rest, -UP, STANDING_HEIGHT)]
+                else:  # the point on which it stands is below its center, however it is turned
+                    lows = [([ball.center], [ball.joint])]
                 under = [rest.data.oMi[joint].act(point) for point, joint in zip(*lows[0], strict=True)]
                 middle = rest.frame(place.frame).actInv(np.mean(under, axis=0))
             # On a thing that ends the sole is not below the face, where the back of the foot would touch.

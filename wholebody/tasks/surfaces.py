@@ -17,6 +17,7 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.link_pieces import drawn_pieces
+from wholebody.figures.postures import zero
 from wholebody.figures.state import State
 from wholebody.geometry.flesh import Flesh, flesh_of
 from wholebody.geometry.pieces import SweptPoints, swept_points
@@ -154,10 +155,10 @@ def once_by(
     scene: Scene, things: Iterable[str], where: str, start: Array, key: Hashable,
     make: Callable[[State, State], _T],
 ) -> _T:  # fmt: skip
-    """What `make` makes of the start (nq,) and the neutral posture; once, if the figure carries none of them."""
+    """What `make` makes of the start (nq,) and of `zero`; once, if the figure carries none of them."""
 
     def made() -> _T:
-        with scene.figure.posed(start) as state, scene.figure.posed(scene.figure.neutral) as rest:
+        with scene.figure.posed(start) as state, scene.figure.posed(zero(scene.figure)) as rest:
             return make(state, rest)
 
     carried = any(joint for thing in things for joint in surface(scene, thing, where).joints)
@@ -262,6 +263,38 @@ def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoin
         pull = radii * (placement.rotation.T @ direction)
         return np.array([placement.translation + placement.rotation @ (radii * pull) / np.linalg.norm(pull)])
     return np.asarray(swept.points @ placement.rotation.T + placement.translation + swept.radius * direction)
+
+
+class Ball(NamedTuple):
+    """The ball of which a foot's underside is a part."""
+
+    center: Array  # (3,) in the axes of the joint that carries the foot [m]
+    radius: float  # [m]
+    joint: int
+
+
+def ball_under(bears: Surface, rest: State) -> Ball | None:
+    """The ball on which a foot rolls in every direction; None where it stands on a sole, or on a line as a wheel."""
+    if len(set(bears.joints)) > 1:
+        return None
+    # Tilted by 10 degrees or by 60, a sole stands on the same edge; the lowest point of a ball moves as the sine.
+    places, tilts = bears.where(rest).places, np.radians((-60.0, -10.0, 10.0, 60.0))
+    angles = np.radians(np.arange(0.0, 180.0, 15.0))
+    along = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
+    under = np.sin(tilts)[:, None, None] * along - np.cos(tilts)[:, None, None] * np.array((0.0, 0.0, 1.0))
+    lowest = np.empty_like(under)
+    for index in np.ndindex(under.shape[:2]):
+        pieces = zip(bears.shapes, places, bears.swept, strict=True)
+        found = np.vstack([outermost(shape, place, under[index], swept) for shape, place, swept in pieces])
+        lowest[index] = found[np.argmax(found @ under[index])]
+    little, large = (((lowest[k] - lowest[3 - k]) * along).sum(axis=1) for k in (2, 3))
+    share = little / np.maximum(large, POINT)
+    if share.max() > 0.67:  # spheres have 0.2, hulls of 48 corners up to 0.56, soles 0.78 to 1, wheels 1 along the axle
+        return None
+    radius = float(large.mean() / (2.0 * np.sin(tilts[3])))
+    center = lowest[[0, 3]].mean(axis=(0, 1)) + (0.0, 0.0, radius * np.cos(tilts[3]))
+    joint = bears.joints[0]
+    return Ball(np.asarray(rest.data.oMi[joint].actInv(center)), radius, joint)
 
 
 def segments_on(scene: Scene, joints: Iterable[int]) -> list[str]:
