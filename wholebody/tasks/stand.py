@@ -24,8 +24,15 @@ from wholebody.tasks.contact_parts import Facing, Gap, Made, Over, Part, TermOfP
 from wholebody.tasks.distance import SumOfSquares
 from wholebody.tasks.faces import UP, face
 from wholebody.tasks.surfaces import (
-    Surface, ball_under, joined, once_by, outermost, segments_beyond, segments_on, surface,
-)  # fmt: skip
+    Surface,
+    ball_under,
+    joined,
+    once_by,
+    outermost,
+    segments_beyond,
+    segments_on,
+    surface,
+)
 
 STANCE_WEIGHTS = np.array((60.0, 300.0, 4.0, 600.0, 600.0))  # of a `Stance`: 1/m^2, but 1/rad^2 of the angle: ESTIMATE
 
