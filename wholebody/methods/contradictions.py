@@ -75,7 +75,7 @@ class _Finder:
             frozen |= self._frozen[-1][1]
         self._group = list(range(model.njoints))
         for joint in range(1, model.njoints) if frozen.any() else ():
-            if frozen[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]].all():
+            if frozen[model.idx_vs[joint] : model.idx_vs[joint] + model.nvExtendeds[joint]].all():
                 self._group[joint] = self._group[model.parents[joint]]
         self._start = state.data
         self._fixed: dict[int, _FixedGroup] = {0: _FixedGroup(pin.SE3.Identity(), "the world")}
@@ -149,7 +149,7 @@ class _Finder:
             model, dofs = self._problem.scene.model, list[int]()
             for end in (limb.joint, reference.joint):
                 while end and end != self._group[limb.joint]:
-                    dofs += range(model.idx_vs[end], model.idx_vs[end] + model.nvs[end])
+                    dofs += range(model.idx_vs[end], model.idx_vs[end] + model.nvExtendeds[end])
                     end = model.parents[end]
             self._violated(name, row.value(self._workspace.state.update(self._problem.start)), dofs)
 

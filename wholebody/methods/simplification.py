@@ -95,7 +95,7 @@ def simplify(problem: Problem) -> Simplified:
     problem.check_fresh()
     whole, still = problem.scene, set(still_dofs(problem))
     model, table = whole.model, whole.pair_table
-    freedoms = [range(first, first + count) for first, count in zip(model.idx_vs, model.nvs, strict=True)]
+    freedoms = [range(first, first + count) for first, count in zip(model.idx_vs, model.nvExtendeds, strict=True)]
     body = np.arange(model.njoints)
     for joint in range(1, model.njoints):
         if still.issuperset(freedoms[joint]):
@@ -168,7 +168,7 @@ class Reach:
         self._ranges: dict[int, Range | None] = {}
         self._near: list[list[int]] = [[] for _ in range(model.njoints)]
         for j in range(1, model.njoints):
-            if self._frozen.issuperset(range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])):
+            if self._frozen.issuperset(range(model.idx_vs[j], model.idx_vs[j] + model.nvExtendeds[j])):
                 self._still[j] = model.jointPlacements[j].actInv(data.liMi[j])
             else:
                 self._ranges[j] = self._range(j)
