@@ -136,3 +136,22 @@ def test_the_command_writes_all_files(folder: Path, tmp_path: Path, capsys: pyte
     for wrong in (["--step", "x"], ["--step", "-1"], ["--low", "1,2"], ["--frame", "tap"], ["--low", "9,9,9"]):
         assert main(["reach", str(folder / "task.toml"), *grid, *wrong, "--out", str(tmp_path)]) == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_what_one_of_the_two_branches_reaches_is_reached(planar: wb.Problem) -> None:
+    # The links' balls are at the elbow's and the forearm's middle: both closed forms of each place, judged by coal.
+    figure, scene = planar.scene.figure, wb.Scene(planar.scene.figure)
+    for number, at in enumerate(np.random.default_rng(1).uniform(-0.5, 0.5, (5, 2))):
+        scene.add(wb.Sphere(0.05), name=f"ball {number}", at=(*at, 0.0))
+    found = area(wb.Problem(scene, planar.start))
+    for place in np.argwhere(found.verdict >= 0).tolist():
+        x, y = found.x[place[0]], found.y[place[1]]
+        cosine = (x * x + y * y - 0.4**2 - 0.3**2) / (2.0 * 0.4 * 0.3)
+        if abs(abs(cosine) - 1.0) < 1e-3:  # at the very edge of the reach
+            continue
+        free = False
+        for second in (np.arccos(cosine), -np.arccos(cosine)) if abs(cosine) < 1.0 else ():
+            first = np.arctan2(y, x) - np.arctan2(0.3 * np.sin(second), 0.4 + 0.3 * np.cos(second))
+            q = np.array([(first + np.pi) % (2.0 * np.pi) - np.pi, second])
+            free |= bool(figure.within_limits(q)) and not scene.penetration(q)
+        assert found.reached[tuple(place)] == free, (x, y)

@@ -173,7 +173,7 @@ def reach_map(
     grid = _grid(low, high, step)
     if method is None:
         whole: Method = QP(measures=False)
-        quick: Method = QP(measures=False, restarts=0, budget=0, iterations=30)  # from a neighbour's posture
+        quick: Method = QP(measures=False, budget=0, iterations=30)  # from a neighbour's posture, or from seeds
     else:
         whole = quick = warn_of_left_out(as_method(method), 2, problem)
     checks.keywords(running, JobOptions, what)
