@@ -26,8 +26,10 @@ def gripper(tmp_path: Path) -> wb.Figure:
     ball = '<sphere radius="0.02"/>'
     parts = [_link("base", '<box size="0.1 0.1 0.02"/>'), _link("palm", '<box size="0.1 0.3 0.02"/>')]
     parts += [_link("left", ball), _link("right", ball)]
-    parts += ["""<joint name="turn" type="revolute"><parent link="base"/><child link="palm"/><origin xyz="0 0 0.1"/>
-<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint>"""]
+    parts += [
+        """<joint name="turn" type="revolute"><parent link="base"/><child link="palm"/><origin xyz="0 0 0.1"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint>"""
+    ]
     parts += [_finger("left", 0.03, "0 1 0"), _finger("right", -0.03, "0 -1 0", '<mimic joint="left_slide"/>')]
     path = tmp_path / "gripper.urdf"
     path.write_text(f'<robot name="gripper">{"".join(parts)}</robot>')

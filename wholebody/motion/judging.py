@@ -238,7 +238,9 @@ def _held(terms: FrameTerms, was: ClipCheck) -> str:
     held = {model.frames[figure.frame_id(term.frame)].parentJoint for term in still}
     bounds = terms.bounds(0)
     kept = (bounds.lower == 0.0) & (bounds.upper == 0.0)
-    moving = {j for j in range(1, model.njoints) if not kept[model.idx_vs[j] : model.idx_vs[j] + model.nvExtendeds[j]].all()}
+    moving = {
+        j for j in range(1, model.njoints) if not kept[model.idx_vs[j] : model.idx_vs[j] + model.nvExtendeds[j]].all()
+    }
     for contact in was.contacts:
         part, thing = contact.first, contact.second
         part, thing = (part, thing) if part in carrier else (thing, part)
