@@ -16,9 +16,9 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
 from wholebody.methods.qp.along_branches import Along
-from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.chain_goals_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
-from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain, rows_of
+from wholebody.methods.qp.plain_chain import FIRST, NEARBY, WIDTHS, Chains, PlainChain, rows_of
 from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
@@ -28,7 +28,7 @@ from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Constraint, Goal, Term
 from wholebody.tasks.checks import is_equality, undefined
 from wholebody.tasks.distance import SquaredDistance
-from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
+from wholebody.terms.entries import MASS_CENTER, PLANE, Entry, entries_of
 
 
 class Met(NamedTuple):
@@ -61,17 +61,39 @@ def chains_of(problem: Problem) -> Pool[Chains]:
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
-    """Entries of goals and equalities, if these are places, rotations and axes; None otherwise."""
+    """Entries of goals and equalities, if a chain takes all of them; None otherwise."""
     if not problem.goals or any(type(one) is not tasks.Freeze for one in problem.bounds):
         return None
     found: list[Entry] = []
     terms: tuple[Goal | Constraint, ...] = (*problem.goals, *filter(is_equality, problem.constraints))
     for term in terms:
         entries = entries_of(term, problem.scene.model)
-        if entries is None or any(entry.table not in (RESIDUAL, AXIS) for entry in entries):
+        if entries is None or any(entry.table not in WIDTHS for entry in entries):
             return None
         found += entries
-    return found
+    return found if _is_of_one_figure(found) else None
+
+
+def _is_of_one_figure(entries: list[Entry]) -> bool:
+    """Whether centres of mass are of the same bodies."""
+    return len({entry.integers for entry in entries if entry.table == MASS_CENTER}) < 2
+
+
+def _sides(problem: Problem, chain: PlainChain, entries: list[Entry]) -> tuple[list[Entry], list[Constraint]]:
+    """Entries of inequalities that a chain takes beside those of goals, and the other inequalities."""
+    inside, others, model = list[Entry](), list[Constraint](), problem.scene.model
+    for one in problem.constraints:
+        if is_equality(one):
+            continue
+        found = entries_of(one, model) or []
+        known = found and all(each.table in (PLANE, MASS_CENTER) and chain.carries(each, model) for each in found)
+        if known and np.isfinite(one.lower).all() and np.isinf(one.upper).all() and _is_of_one_figure(entries + found):
+            for entry, lower in zip(found, np.broadcast_to(one.lower, len(found)).tolist(), strict=True):
+                entry.floats[-1] += lower  # the last float is subtracted from the value
+            inside += found
+        else:
+            others.append(one)
+    return inside, others
 
 
 def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, control: Control) -> Met | None:
@@ -97,7 +119,7 @@ class Asked(NamedTuple):
     at: Array  # (nq,) its start, within limits
     nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
     clearances: Array  # (pairs,) metres
-    bounded: tuple[Constraint, ...] = ()  # inequalities, which reject ends
+    bounded: tuple[Constraint, ...] = ()  # inequalities that reject ends: those that are not among the goals
     own: tuple[Term, ...] = ()  # terms of one's own, which may be undefined at some postures
 
     @classmethod
@@ -108,9 +130,12 @@ class Asked(NamedTuple):
         nearest[0] = chain.angles(at if distance is None else distance.reference)
         if distance is not None:
             nearest[1] = distance.weights[chain.idx_v]
-        bounded = tuple(one for one in problem.constraints if not is_equality(one))
+        goals, bounded = chain.goals(entries), [one for one in problem.constraints if not is_equality(one)]
+        if bounded and not chain.is_finite(goals):  # of isolated postures none is moved
+            sides, bounded = _sides(problem, chain, entries)
+            goals = chain.goals(entries, sides)
         own = tuple(one for one in (*problem.constraints, *problem.measures) if is_own(one))
-        return cls(chain.goals(entries), at, nearest, problem.clearances, bounded, own)
+        return cls(goals, at, nearest, problem.clearances, tuple(bounded), own)
 
 
 def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
@@ -179,7 +204,7 @@ class Descents:
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
                 # An end of an exact arm that did not come to rest at its limits takes at most a per cent more.
-                settled = self.chain.arm is not None and not self.asked.bounded
+                settled = self.chain.arm is not None and not self.asked.bounded and not self.asked.goals.one_sided.any()
                 return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
@@ -213,7 +238,7 @@ class Descents:
     def _along_branches(self, branches: Branches, most: float) -> Array | None:
         """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
         goals, at, nearest, clearances, bounded, _ = self.asked
-        if bounded:
+        if bounded or goals.one_sided.any():
             return None  # intervals of branches end where things are in the way, and not where inequalities do
         asked = how_far(self.settings, 1, others=True)
         along = Along(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
@@ -310,7 +335,8 @@ class Descents:
 
     def _is_redundant(self) -> bool:
         """Whether joints move where the goals are met: rows of several terms may be the same."""
-        rows = self.chain.room(self.rule.rows).jacobian  # at the last end
+        goals = self.asked.goals
+        rows = self.chain.room(rows_of(goals)).jacobian[~goals.one_sided]  # at the last end
         return len(self.start) > len(rows) or bool(np.linalg.matrix_rank(rows, 1e-3) < len(self.start))  # m, rad a rad
 
     def _is_defined(self, q: Array) -> bool:
@@ -335,7 +361,7 @@ class Rule(NamedTuple):
     held: bool  # with one joint held, so that ends lie along branches
     finite: bool  # whether ends are isolated, and the closed form has all of them
     enough: int  # ends that meet the goals
-    rows: int  # of the goals
+    rows: int  # of the goals, without those of inequalities
     together: int  # seeds of a batch of random ones
     measured: bool  # whether ends are compared by a measure
     nearly: bool  # whether the closed form is only near to postures, and lacks some of an arm that is stretched
@@ -349,10 +375,11 @@ class Rule(NamedTuple):
         """The rule for problems with such goals."""
         guided, more = chain.is_guided(goals), 1 + settings.restarts_for_measure
         held = guided and chain.held >= 0
-        finite = guided and not held and chain.arm is not None
+        finite = chain.is_finite(goals)
         enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
         nearly = guided and chain.arm is None and measured
-        return cls(guided, held, finite, enough, rows_of(goals), SEEDS.together * more, measured, nearly)
+        rows = rows_of(goals) - int(np.count_nonzero(goals.one_sided))
+        return cls(guided, held, finite, enough, rows, SEEDS.together * more, measured, nearly)
 
 
 def is_free(workspace: Workspace, q: Array, clearances: Array, within: float) -> bool:

@@ -15,16 +15,17 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import branch_kernel, chain_kernel
-from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
+from wholebody.methods.qp.chain_goals_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
-from wholebody.terms.entries import AXIS, RESIDUAL, Entry, Integers
+from wholebody.terms.entries import AXIS, MASS_CENTER, PLANE, RESIDUAL, Entry, Integers
 
 LOOSE = 1e-2  # a share of lengths, and rad
 NEARBY = 1e-3  # m, rad
 FIRST = 16  # ends of a closed form's branches that the compiled loop has room for
+WIDTHS = {RESIDUAL: (36, 6), AXIS: (24, 3), PLANE: (7, 2), MASS_CENTER: (4, 1)}  # floats, integers
 _NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
 _ONE = np.zeros(1)
 
@@ -49,7 +50,10 @@ class PlainChain:
         subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
         placements = [model.jointPlacements[joint] for joint in joints]
         self._number = number
-        self._integers: dict[tuple[tuple[int, ...], ...], tuple[Integers, Integers]] = {}
+        self._integers: dict[tuple[tuple[int, ...], ...], dict[int, Integers]] = {}
+        inertias = [model.inertias[joint] for joint in joints]
+        self._joints, self._bodies = np.array([0, *joints]), np.zeros((len(joints) + 1, 4))
+        self._bodies[1:] = [[inertia.mass, *(inertia.mass * inertia.lever)] for inertia in inertias]
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
         self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
         first, last = int(self._idx_q[0]), int(self._idx_q[-1]) + 1
@@ -105,23 +109,39 @@ class PlainChain:
             q[..., self._idx_q[self._round]], q[..., self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
         return q
 
-    def goals(self, entries: list[Entry]) -> Goals:
-        """Entries of goals with the numbers of these joints."""
-        kinds = tuple([(entry.table, *entry.integers) for entry in entries])
+    def goals(self, entries: Sequence[Entry], sides: Sequence[Entry] = ()) -> Goals:
+        """Entries of goals, and of inequalities, with the numbers of these joints."""
+        every = [*entries, *sides]
+        kinds = tuple([(entry.table, *entry.integers) for entry in every])
         known = self._integers.get(kinds)
         if known is None:
-            placed, pointed, row = list[tuple[int, ...]](), list[tuple[int, ...]](), 0
-            for entry in entries:
-                joint, second, *kind = entry.integers
+            written: dict[int, list[tuple[int, ...]]] = {table: [] for table in WIDTHS}
+            row = 0
+            for entry in every:
+                joint, *kind = entry.integers
                 if entry.table == RESIDUAL:
-                    placed.append((row, self._number[joint], self._number[second], *kind))
+                    written[RESIDUAL].append((row, self._number[joint], self._number[kind[0]], *kind[1:]))
                 else:
-                    pointed.append((row, self._number[joint], second))
+                    placed = () if entry.table == MASS_CENTER else (self._number[joint], *kind)
+                    written[entry.table].append((row, *placed))
                 row += entry.rows
-            known = np.array(placed, dtype=np.int64).reshape(-1, 6), np.array(pointed, dtype=np.int64).reshape(-1, 3)
+            known = {t: np.array(written[t], dtype=np.int64).reshape(-1, width) for t, (_, width) in WIDTHS.items()}
             self._integers[kinds] = known
-        places, axes = ([entry.floats for entry in entries if entry.table == table] for table in (RESIDUAL, AXIS))
-        return Goals(np.array(places).reshape(-1, 36), known[0], np.array(axes).reshape(-1, 24), known[1])
+        tables = [
+            np.array([entry.floats for entry in every if entry.table == table]).reshape(-1, width)
+            for table, (width, _) in WIDTHS.items()
+        ]
+        one_sided = np.arange(sum(entry.rows for entry in every)) >= sum(entry.rows for entry in entries)
+        bodies = self._bodies
+        if ends := next((entry.integers for entry in every if entry.table == MASS_CENTER), None):
+            counts = (self._joints >= ends[0]) & (self._joints < ends[1])
+            bodies = bodies * counts[:, None] / (bodies[:, 0] @ counts)
+        placed, pointed, flat, masses = ((tables[k], known[table]) for k, table in enumerate(WIDTHS))
+        return Goals(*placed, *pointed, *flat, *masses, bodies, one_sided)
+
+    def carries(self, entry: Entry, model: pin.Model) -> bool:
+        """Whether all joints that an entry depends on are of this chain."""
+        return all(joint in self._number for joint in joints_of(entry, model))
 
     def room(self, rows: int) -> Room:
         """Room for descents with so many rows: the same for the same number."""
@@ -131,7 +151,7 @@ class PlainChain:
             joints[0, :3] = np.eye(3)
             self._rooms[rows] = Room(
                 joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
-                np.empty(size, dtype=np.bool_),
+                np.empty(size, dtype=np.bool_), np.empty(rows, dtype=np.bool_), np.zeros((size + 1, 4)),
             )  # fmt: skip
         return self._rooms[rows]
 
@@ -189,8 +209,12 @@ class PlainChain:
 
     def is_guided(self, goals: Goals) -> bool:
         """Whether the goals are one placement of a frame that the guide has postures of."""
-        alone = self.guide is not None and not len(goals.axis_entries)
+        alone = self.guide is not None and len(goals.one_sided) - np.count_nonzero(goals.one_sided) == 6
         return alone and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
+
+    def is_finite(self, goals: Goals) -> bool:
+        """Whether the closed form has all postures of the goals, and these are isolated."""
+        return self.arm is not None and self.held < 0 and self.is_guided(goals)
 
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
@@ -239,13 +263,13 @@ class Chains:
 
     def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
         """The chain that carries the frames of goals."""
-        return self.of(frozenset(joint for entry in entries for joint in _joints_of(entry)))
+        return self.of(frozenset(joint for entry in entries for joint in joints_of(entry, self._model)))
 
     def apart(self, entries: Sequence[Entry]) -> list[tuple[PlainChain, list[Entry]]]:
         """The chains that carry the frames of goals and have no joint in common, each with its entries."""
         groups = list[tuple[set[int], list[Entry]]]()
         for entry in entries:
-            joints = {above for joint in _joints_of(entry) for above in self._model.supports[joint]} - {0}
+            joints = {above for joint in joints_of(entry, self._model) for above in self._model.supports[joint]} - {0}
             own, others = [entry], list[tuple[set[int], list[Entry]]]()
             for known, theirs in groups:
                 if known & joints:
@@ -257,19 +281,16 @@ class Chains:
         return [(chain, own) for chain, own in found if chain is not None]
 
 
-def _joints_of(entry: Entry) -> tuple[int, ...]:
-    """The joints of a frame, and of the frame that its goal is relative to."""
+def joints_of(entry: Entry, model: pin.Model) -> tuple[int, ...]:
+    """The joints of a frame, and of the frame that its goal is relative to, or those that carry a mass that counts."""
+    if entry.table == MASS_CENTER:
+        return tuple(joint for joint in range(*entry.integers) if model.inertias[joint].mass > 0.0)
     return entry.integers[: 2 if entry.table == RESIDUAL else 1]
 
 
 def rows_of(goals: Goals) -> int:
     """How many rows the goals have."""
-    return _rows(goals.entries.tobytes()) + 2 * len(goals.axis_entries)
-
-
-@lru_cache(maxsize=256)
-def _rows(entries: bytes) -> int:
-    return 3 * int(np.frombuffer(entries, dtype=np.int64).reshape(-1, 6)[:, 3:5].sum())
+    return len(goals.one_sided)
 
 
 @lru_cache(maxsize=64)
@@ -293,11 +314,13 @@ def compiled_kernel(_: Any) -> None:
     closed_form_kernel()
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
     room = Room(
-        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
-    )
+        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_),
+        np.zeros(0, np.bool_), np.zeros((2, 4)),
+    )  # fmt: skip
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
-    bodies, entries, near = (chain, _NO_ARM, room), np.zeros((0, 6), dtype=np.int64), np.zeros((0, 2, 1))
-    goals, efforts = Goals(np.zeros((1, 36)), entries, np.zeros((0, 24)), entries[:, :3].copy()), np.empty((0, 2))
+    bodies, near, efforts = (chain, _NO_ARM, room), np.zeros((0, 2, 1)), np.empty((0, 2))
+    tables = [np.zeros((0, width), kind) for widths in WIDTHS.values() for width, kind in zip(widths, (float, np.int64))]
+    goals = Goals(*tables, np.zeros((2, 4)), np.zeros(0, np.bool_))
     chain_kernel.reach_all(
         bodies, np.zeros(5), (np.zeros((0, 0, 36)), goals), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
         np.zeros(0, dtype=np.intp),
