@@ -16,6 +16,7 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
 from wholebody.methods.qp.along_branches import Along
+from wholebody.methods.qp.at_contacts import AtContacts
 from wholebody.methods.qp.chain_goals_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, WIDTHS, Chains, PlainChain, rows_of
@@ -175,6 +176,7 @@ class Descents:
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
+        self.ends: list[tuple[float, Array]] = []  # effort and values (n,) of all such ends
 
     def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
         """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
@@ -218,6 +220,7 @@ class Descents:
                     met = self._ended(left, enough, others=True)
             if met is not None and self.rule.measured and not self.measured:
                 return Met(self.asked.at, met.trace, False, free=met.q, through=self.blocked)
+            met = self._at_contacts(met)
             if met is not None or self.control.over:
                 return met
             redundant = self.measured and len(self.start) > self.rule.rows
@@ -244,6 +247,30 @@ class Descents:
         along = Along(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
         found = along.least(branches, most)
         return None if found is None else self.chain.posture(found.values, at)
+
+    def _at_contacts(self, met: Met | None) -> Met | None:
+        """An end, or one of less effort where blocked ends are led to contacts."""
+        if not self.measured or self.asked.bounded or self.asked.own or not self.ends or not self._is_redundant():
+            return met
+        goals, at, nearest, clearances, *_ = self.asked
+        asked = how_far(self.settings, 1, others=True)
+        contacts = AtContacts(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
+        best, most = met, np.inf if met is None else self._effort(met.q)
+        tried, known = list[Array](), True
+        for effort, values in sorted(self.ends, key=lambda each: each[0]):
+            if effort >= SEEDS.worth * most or len(tried) == SEEDS.near:
+                break
+            if any(np.abs(values - each).max() < SEEDS.differing for each in tried):
+                continue
+            tried.append(values)
+            found = contacts.least(values, most)
+            known = known and found is not None
+            if found is not None and found[0].effort < most:
+                best, most = Met(self.chain.posture(found[0].values, at), tuple(self.trace), found[1]), found[0].effort
+        self.ends = []
+        if best is None:
+            return None
+        return with_values(best, blocked=None if known else self.blocked, through=self.blocked)
 
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
@@ -317,6 +344,7 @@ class Descents:
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             if not self._is_defined(q):
                 return Met(self.asked.at, tuple(self.trace), False)  # descents from the start end at the edge
+            self.ends.append((effort, seeds[k].copy()))
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
 

@@ -11,7 +11,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.base.dense_kernel import dot
 from wholebody.terms.entries import Integers
-from wholebody.terms.residual_kernel import axis_errors, planes, residuals
+from wholebody.terms.residual_kernel import axis_errors, residuals
 
 
 class Chain(NamedTuple):
@@ -34,7 +34,7 @@ class Goals(NamedTuple):
     axis_tables: Array  # (a, 24) floats of axes
     axis_entries: Integers  # (a, 3) their integers
     plane_tables: Array  # (p, 7) floats of planes
-    plane_entries: Integers  # (p, 2) their integers
+    plane_entries: Integers  # (p, 3) their integers, the last the joint that a plane is fixed to, 0 being the world
     mass_tables: Array  # (c, 4) floats of rows of one centre of mass
     mass_entries: Integers  # (c, 1) their integers: the row
     bodies: Array  # (n + 1, 4) share of the mass that is fixed to each joint, and that times its place there
@@ -91,9 +91,28 @@ def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
             room.wrench[row : row + 2] = 0.0  # of a direction no force is written
         axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)
     if len(goals.plane_entries) > 0:
-        planes(goals.plane_tables, goals.plane_entries, joints, room.wrench, room.value)
+        _planes(goals, room)
     if len(goals.mass_entries) > 0:
         _mass_center(chain, goals, room)
+
+
+@compiled(inner=True)
+def _planes(goals: Goals, room: Room) -> None:
+    """Distances of points from planes, with wrenches in the world."""
+    tables, point, normal = goals.plane_tables, np.empty(3), np.empty(3)
+    for e in range(len(tables)):
+        row, joint, base = goals.plane_entries[e, 0], room.joints[goals.plane_entries[e, 1]], goals.plane_entries[e, 2]
+        room.value[row] = -tables[e, 6]
+        for i in range(3):
+            point[i], normal[i] = joint[3, i], 0.0
+            for k in range(3):
+                point[i] += joint[k, i] * tables[e, k]
+                normal[i] += room.joints[base, k, i] * tables[e, 3 + k]
+            room.value[row] += normal[i] * (point[i] - room.joints[base, 3, i])
+            room.wrench[row, i] = normal[i]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            room.wrench[row, 3 + i] = point[j] * normal[k] - point[k] * normal[j]
 
 
 @compiled(inner=True, error_model="numpy")
@@ -130,9 +149,10 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
             for k in range(len(room.columns)):
                 room.jacobian[r, k] = support[axes[e, 1], k] * dot(room.wrench[r], room.columns[k])
     for e in range(len(goals.plane_entries)):
-        r, joint = goals.plane_entries[e, 0], goals.plane_entries[e, 1]
+        r, joint, base = goals.plane_entries[e]
         for k in range(len(room.columns)):
-            room.jacobian[r, k] = support[joint, k] * dot(room.wrench[r], room.columns[k])
+            moved = support[joint, k] - support[base, k]
+            room.jacobian[r, k] = moved * dot(room.wrench[r], room.columns[k]) if moved != 0 else 0.0
     for e in range(len(goals.mass_entries)):
         r, way = goals.mass_entries[e, 0], goals.mass_tables[e]
         for k in range(len(room.columns)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from copy import copy
 from functools import lru_cache
 from typing import Any
@@ -20,12 +20,13 @@ from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
-from wholebody.terms.entries import AXIS, MASS_CENTER, PLANE, RESIDUAL, Entry, Integers
+from wholebody.terms.entries import AXIS, MASS_CENTER, PLANE, RESIDUAL, Entry
 
 LOOSE = 1e-2  # a share of lengths, and rad
 NEARBY = 1e-3  # m, rad
 FIRST = 16  # ends of a closed form's branches that the compiled loop has room for
-WIDTHS = {RESIDUAL: (36, 6), AXIS: (24, 3), PLANE: (7, 2), MASS_CENTER: (4, 1)}  # floats, integers
+WIDTHS = {RESIDUAL: (36, 6), AXIS: (24, 3), PLANE: (7, 3), MASS_CENTER: (4, 1)}  # floats, integers
+_NO_FLOATS = {width: np.zeros((0, width)) for width, _ in WIDTHS.values()}
 _NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
 _ONE = np.zeros(1)
 
@@ -36,6 +37,8 @@ class PlainChain:
     Attributes:
         chain: the arrays.
         idx_v: (n,) place of each joint in the tangent.
+        joints: (n + 1,) their numbers in the model, the world first.
+        carriers: (njoints,) the joint of the chain, or the world, that carries each of the model.
         arm: the arm that they are, None where it has no closed form.
         guide: the same, or an arm that they nearly are.
         held: the joint that the closed form of the guide holds; -1 for none.
@@ -50,9 +53,11 @@ class PlainChain:
         subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
         placements = [model.jointPlacements[joint] for joint in joints]
         self._number = number
-        self._integers: dict[tuple[tuple[int, ...], ...], dict[int, Integers]] = {}
+        self._known: dict[Hashable, tuple[Any, ...]] = {}  # see `goals`
         inertias = [model.inertias[joint] for joint in joints]
-        self._joints, self._bodies = np.array([0, *joints]), np.zeros((len(joints) + 1, 4))
+        self.joints, self._bodies = np.array([0, *joints]), np.zeros((len(joints) + 1, 4))
+        above = [[number[one] for one in list(model.supports[joint]) if one in number] for joint in range(model.njoints)]
+        self.carriers = np.array([every[-1] for every in above])
         self._bodies[1:] = [[inertia.mass, *(inertia.mass * inertia.lever)] for inertia in inertias]
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
         self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
@@ -112,32 +117,32 @@ class PlainChain:
     def goals(self, entries: Sequence[Entry], sides: Sequence[Entry] = ()) -> Goals:
         """Entries of goals, and of inequalities, with the numbers of these joints."""
         every = [*entries, *sides]
-        kinds = tuple([(entry.table, *entry.integers) for entry in every])
-        known = self._integers.get(kinds)
-        if known is None:
-            written: dict[int, list[tuple[int, ...]]] = {table: [] for table in WIDTHS}
-            row = 0
-            for entry in every:
-                joint, *kind = entry.integers
-                if entry.table == RESIDUAL:
-                    written[RESIDUAL].append((row, self._number[joint], self._number[kind[0]], *kind[1:]))
-                else:
-                    placed = () if entry.table == MASS_CENTER else (self._number[joint], *kind)
-                    written[entry.table].append((row, *placed))
-                row += entry.rows
-            known = {t: np.array(written[t], dtype=np.int64).reshape(-1, width) for t, (_, width) in WIDTHS.items()}
-            self._integers[kinds] = known
-        tables = [
-            np.array([entry.floats for entry in every if entry.table == table]).reshape(-1, width)
-            for table, (width, _) in WIDTHS.items()
-        ]
-        one_sided = np.arange(sum(entry.rows for entry in every)) >= sum(entry.rows for entry in entries)
-        bodies = self._bodies
-        if ends := next((entry.integers for entry in every if entry.table == MASS_CENTER), None):
-            counts = (self._joints >= ends[0]) & (self._joints < ends[1])
-            bodies = bodies * counts[:, None] / (bodies[:, 0] @ counts)
-        placed, pointed, flat, masses = ((tables[k], known[table]) for k, table in enumerate(WIDTHS))
-        return Goals(*placed, *pointed, *flat, *masses, bodies, one_sided)
+        kinds = len(sides), tuple([(entry.table, *entry.integers) for entry in every])
+        if kinds not in self._known:
+            self._known[kinds] = self._read(entries, sides)
+        known, floats = self._known[kinds], list[Array]()
+        for table, (width, _) in WIDTHS.items():
+            some = [entry.floats for entry in every if entry.table == table]
+            floats.append(np.array(some) if some else _NO_FLOATS[width])
+        return Goals(floats[0], known[0], floats[1], known[1], floats[2], known[2], floats[3], *known[3:])
+
+    def _read(self, entries: Sequence[Entry], sides: Sequence[Entry]) -> tuple[Any, ...]:
+        """What `Goals` has of entries but for floats."""
+        written: dict[int, list[tuple[int, ...]]] = {table: [] for table in WIDTHS}
+        row, bodies = 0, self._bodies
+        for entry in (*entries, *sides):
+            joint, *kind = entry.integers
+            if entry.table == RESIDUAL:
+                written[RESIDUAL].append((row, self._number[joint], self._number[kind[0]], *kind[1:]))
+            elif entry.table == MASS_CENTER:
+                counts = (self.joints >= joint) & (self.joints < kind[0])
+                bodies = self._bodies * counts[:, None] / (self._bodies[:, 0] @ counts)
+                written[MASS_CENTER].append((row,))
+            else:
+                written[entry.table].append((row, self._number[joint], *kind, 0)[:3])  # a plane is of the world
+            row += entry.rows
+        integers = [np.array(written[t], dtype=np.int64).reshape(-1, width) for t, (_, width) in WIDTHS.items()]
+        return *integers, bodies, np.arange(row) >= row - sum(entry.rows for entry in sides)
 
     def carries(self, entry: Entry, model: pin.Model) -> bool:
         """Whether all joints that an entry depends on are of this chain."""
