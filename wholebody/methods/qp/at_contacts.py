@@ -45,8 +45,7 @@ class AtContacts(NamedTuple):
     def least(self, values: Array, most: float) -> tuple[Look, bool] | None:
         """From values (n,) that meet the goals the free ones of least effort nearby; None where they are not found.
 
-        The second is whether they are a minimum. Where the effort would not be less than `most`, the search ends with a
-        posture that may be blocked.
+        The second is whether they are a minimum. None too where a descent leads to no less effort than `most`.
         """
         planes, fresh = list[Planes](), True
         for _ in range(SEEDS.closer):
@@ -55,11 +54,9 @@ class AtContacts(NamedTuple):
             # Of what touches along a line or a face one point is the witness, then another: both stay.
             planes = [*planes[-2:], self._planes(near, gaps)]
             end, effort = self._descended(values, planes)
-            if effort == np.inf:
+            if effort >= most:
                 return None
             free = float(gaps.min(initial=SEEDS.ahead))
-            if effort >= most:
-                return Look(end, effort, free), True
             if float(np.abs(end - values).max()) < SAME and free >= 0.0:
                 end, _ = self._descended(values, planes[-1:])
                 settled = float(np.abs(end - values).max()) < SAME

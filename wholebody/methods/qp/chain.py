@@ -210,7 +210,9 @@ class Descents:
                 return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
-            if first is None:
+            if self.measured < self.rule.measured:
+                met = self._from_free(seeds)
+            elif first is None:
                 met = self._ended(seeds, enough)
             else:
                 (ends, found), first = first, None
@@ -218,16 +220,12 @@ class Descents:
                 if met is None and not self.control.over:
                     left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
                     met = self._ended(left, enough, others=True)
-            if met is not None and self.rule.measured and not self.measured:
-                return Met(self.asked.at, met.trace, False, free=met.q, through=self.blocked)
             met = self._at_contacts(met)
             if met is not None or self.control.over:
                 return met
             redundant = self.measured and len(self.start) > self.rule.rows
             if number == SEEDS.weighed and redundant and self.blocked is not None:
-                # Ends of least effort gather at the same places: of others more are free.
-                enough, self.measured = 1, False
-                self.asked = with_values(self.asked, nearest=self.asked.nearest * [[1.0], [0.0]])
+                self.measured = False  # ends of least effort gather at the same places: of others more are free
         return None
 
     def _or_from_random(self, met: Met | None) -> Met | None:
@@ -252,9 +250,7 @@ class Descents:
         """An end, or one of less effort where blocked ends are led to contacts."""
         if not self.measured or self.asked.bounded or self.asked.own or not self.ends or not self._is_redundant():
             return met
-        goals, at, nearest, clearances, *_ = self.asked
-        asked = how_far(self.settings, 1, others=True)
-        contacts = AtContacts(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
+        contacts, at = self._contacts(), self.asked.at
         best, most = met, np.inf if met is None else self._effort(met.q)
         tried, known = list[Array](), True
         for effort, values in sorted(self.ends, key=lambda each: each[0]):
@@ -271,6 +267,31 @@ class Descents:
         if best is None:
             return None
         return with_values(best, blocked=None if known else self.blocked, through=self.blocked)
+
+    def _contacts(self) -> AtContacts:
+        goals, at, nearest, clearances, *_ = self.asked
+        asked = how_far(self.settings, 1, others=True)
+        return AtContacts(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
+
+    def _from_free(self, seeds: Array) -> Met | None:
+        """The least effort at contacts from the first free ends of descents without it; None where none is free."""
+        (goals, at, nearest, *_), asked = self.asked, how_far(self.settings, len(seeds), others=True)
+        known = (nearest * [[1.0], [0.0]])[None]
+        found, _ = self.chain.descents(goals.tables[None], goals, known, asked, seeds[None], len(seeds))
+        contacts, best, most, tried = self._contacts(), None, np.inf, 0
+        for values in seeds[found[0, :, 1] < np.inf]:
+            if not self._is_free(q := self.chain.posture(values, at)):
+                continue
+            tried, best = tried + 1, best or Met(at, tuple(self.trace), False, free=q, through=self.blocked)
+            look = None if self.asked.bounded or self.asked.own else contacts.least(values, most)
+            if look is not None and look[0].effort < most:
+                q, most = self.chain.posture(look[0].values, at), look[0].effort
+                if self.least >= SEEDS.worth * most:
+                    return Met(q, tuple(self.trace), look[1], through=self.blocked)
+                best = with_values(best, free=q)
+            if tried == SEEDS.compared:
+                break
+        return best
 
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
