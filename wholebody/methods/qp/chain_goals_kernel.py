@@ -148,6 +148,14 @@ def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
         for r in range(axes[e, 0], axes[e, 0] + 2):
             for k in range(len(room.columns)):
                 room.jacobian[r, k] = support[axes[e, 1], k] * dot(room.wrench[r], room.columns[k])
+    if len(goals.plane_entries) + len(goals.mass_entries) > 0:
+        _rows_of_others(chain, goals, room)
+
+
+@compiled(error_model="numpy")
+def _rows_of_others(chain: Chain, goals: Goals, room: Room) -> None:
+    """The same of planes and of the centre of mass."""
+    support = chain.support
     for e in range(len(goals.plane_entries)):
         r, joint, base = goals.plane_entries[e]
         for k in range(len(room.columns)):

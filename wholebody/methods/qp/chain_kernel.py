@@ -44,6 +44,9 @@ def reach(
         weighed = weighed or weight > 0.0
     for one_sided in goals.one_sided:
         equal += 0 if one_sided else 1
+    for r in range(len(room.value)):
+        room.active[r] = True
+    sided = equal < len(room.value)
     for k in range(len(seeds)):
         q = seeds[k]
         if weighed and asked[4] > 0.0 and expected[k] > HARDLY * best:
@@ -54,7 +57,7 @@ def reach(
             continue
         # Programs for the least effort remove the remaining errors too, where they have a way to go.
         done = 1e-3 * tolerance if weighed and len(q) > equal else 0.0
-        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most)
+        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most, sided)
         left = np.sqrt(dot(room.value, room.value))
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps
         if not left <= tolerance:
@@ -62,7 +65,7 @@ def reach(
         _unwind(chain, q, nearest[0])
         if weighed:
             before = q.copy()
-            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf
+            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf, sided
             found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
             if found[k, 2] == 0.0:
                 copy(before, q)
@@ -79,7 +82,7 @@ def reach(
 
 @compiled(inner=True, error_model="numpy")
 def _descend(
-    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int
+    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int, sided: bool
 ) -> int:  # fmt: skip
     """Steps of damped least squares until the goals' errors, `room.value`, are small as they get, or hardly fall.
 
@@ -92,9 +95,10 @@ def _descend(
     before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
-        _activate(goals, room)
-        for r in range(rows):
-            room.value[r] = room.value[r] if room.active[r] else 0.0
+        if sided:
+            _activate(goals, room)
+            for r in range(rows):
+                room.value[r] = room.value[r] if room.active[r] else 0.0
         left = np.sqrt(dot(room.value, room.value))
         if count == most or left <= done or (left <= tolerance and count and left > 0.5 * before):
             return count
@@ -116,7 +120,7 @@ def _descend(
                     if not room.free[i]:
                         right[r] -= room.jacobian[r, i] * dq[i]
                 damped += 0.5 * right[r] * right[r]
-            _fill_normal(room, ones, damped, scaled, system)
+            _fill_normal(room, ones, damped, scaled, system, sided)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -131,7 +135,7 @@ def _descend(
 
 @compiled(inner=True, error_model="numpy")
 def _least_effort(
-    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, asked: tuple[float, float], found: Array
+    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, asked: tuple[float, float, bool], found: Array
 ) -> int:  # fmt: skip
     """Step to the least effort among postures that meet the goals, by programs whose constraints are linear.
 
@@ -140,7 +144,7 @@ def _least_effort(
     is J. Barzilai and J. M. Borwein's step length ("Two-Point Step Size Gradient Methods", IMA Journal of Numerical
     Analysis 8, 1988), since the curvature of the constraints is left out of the programs. Sets ``found[0]`` to the
     norm of the errors, and ``found[2]`` to 1 where it converged, to -1 where the effort will clearly be more than
-    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance.
+    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance, ``asked[2]`` whether there are inequalities.
 
     Returns:
         Steps taken.
@@ -148,12 +152,13 @@ def _least_effort(
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
     moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
-    released, scaled, (tolerance, most) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
+    released, scaled, (tolerance, most, sided) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
     let_go = np.empty(rows, dtype=np.bool_)  # rows that were
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
-        _activate(goals, room)
+        if sided:
+            _activate(goals, room)
         left = 0.0
         for r in range(rows):
             left += room.value[r] ** 2 if room.active[r] else 0.0
@@ -168,7 +173,7 @@ def _least_effort(
                 right[r] = room.value[r] if room.active[r] else 0.0
                 for i in range(size if room.active[r] else 0):
                     right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
-            _fill_normal(room, nearest[1], 1e-12, scaled, system)
+            _fill_normal(room, nearest[1], 1e-12, scaled, system, sided)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -178,7 +183,7 @@ def _least_effort(
                         dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
             changed = _hold_first(chain, room.free, q, dq)
             if not changed:
-                row = _next_row(goals, room, dq, right)
+                row = _next_row(goals, room, dq, right) if sided else -1
                 changed = row >= 0 and not (room.active[row] and let_go[row])
                 if changed:
                     let_go[row] = let_go[row] or room.active[row]
@@ -235,7 +240,7 @@ def _next_row(goals: Goals, room: Room, dq: Array, multipliers: Array) -> int:
 
 
 @compiled(inner=True, error_model="numpy")
-def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array) -> None:
+def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array, sided: bool) -> None:
     """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,); `scaled` is room."""
     for r in range(len(system)):
         for i in range(len(weights)):
@@ -243,6 +248,7 @@ def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, syst
     gram(scaled, room.jacobian, len(system), system)
     for r in range(len(system)):
         system[r, r] += damping
+    for r in range(len(system) if sided else 0):
         if not room.active[r]:
             for s in range(len(system)):
                 system[max(r, s), min(r, s)] = 1.0 if r == s else 0.0
