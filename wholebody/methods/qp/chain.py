@@ -424,7 +424,7 @@ class Rule(NamedTuple):
         """The rule for problems with such goals."""
         guided, more = chain.is_guided(goals), 1 + settings.restarts_for_measure
         held = guided and chain.held >= 0
-        finite = chain.is_finite(goals)
+        finite = guided and not held and chain.arm is not None
         enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
         nearly = guided and chain.arm is None and measured
         rows = rows_of(goals) - int(np.count_nonzero(goals.one_sided))

@@ -7,7 +7,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.base.dense_kernel import copy, dot, gram, solve
-from wholebody.methods.qp.chain_goals_kernel import Chain, Goals, Room, evaluate, rows_of
+from wholebody.methods.qp.chain_goals_kernel import Chain, Goals, Room, evaluate, evaluate_others, rows_of, rows_of_others
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
 
 CLEARLY, NEAR = 1.25, 0.3
@@ -46,7 +46,7 @@ def reach(
         equal += 0 if one_sided else 1
     for r in range(len(room.value)):
         room.active[r] = True
-    sided = equal < len(room.value)
+    others = len(goals.plane_entries) + len(goals.mass_entries) > 0
     for k in range(len(seeds)):
         q = seeds[k]
         if weighed and asked[4] > 0.0 and expected[k] > HARDLY * best:
@@ -57,7 +57,7 @@ def reach(
             continue
         # Programs for the least effort remove the remaining errors too, where they have a way to go.
         done = 1e-3 * tolerance if weighed and len(q) > equal else 0.0
-        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most, sided)
+        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most, others)
         left = np.sqrt(dot(room.value, room.value))
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps
         if not left <= tolerance:
@@ -65,7 +65,7 @@ def reach(
         _unwind(chain, q, nearest[0])
         if weighed:
             before = q.copy()
-            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf, sided
+            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf, others
             found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
             if found[k, 2] == 0.0:
                 copy(before, q)
@@ -82,7 +82,7 @@ def reach(
 
 @compiled(inner=True, error_model="numpy")
 def _descend(
-    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int, sided: bool
+    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int, others: bool
 ) -> int:  # fmt: skip
     """Steps of damped least squares until the goals' errors, `room.value`, are small as they get, or hardly fall.
 
@@ -95,7 +95,8 @@ def _descend(
     before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
-        if sided:
+        if others:
+            evaluate_others(chain, goals, room)
             _activate(goals, room)
             for r in range(rows):
                 room.value[r] = room.value[r] if room.active[r] else 0.0
@@ -109,6 +110,8 @@ def _descend(
                 return count
             marked = left
         rows_of(chain, goals, room)
+        if others:
+            rows_of_others(chain, goals, room)
         for i in range(size):
             room.free[i], dq[i] = True, 0.0
         held = True
@@ -120,7 +123,7 @@ def _descend(
                     if not room.free[i]:
                         right[r] -= room.jacobian[r, i] * dq[i]
                 damped += 0.5 * right[r] * right[r]
-            _fill_normal(room, ones, damped, scaled, system, sided)
+            _fill_normal(room, ones, damped, scaled, system, others)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -144,7 +147,7 @@ def _least_effort(
     is J. Barzilai and J. M. Borwein's step length ("Two-Point Step Size Gradient Methods", IMA Journal of Numerical
     Analysis 8, 1988), since the curvature of the constraints is left out of the programs. Sets ``found[0]`` to the
     norm of the errors, and ``found[2]`` to 1 where it converged, to -1 where the effort will clearly be more than
-    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance, ``asked[2]`` whether there are inequalities.
+    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance, ``asked[2]`` whether there are planes or a centre of mass.
 
     Returns:
         Steps taken.
@@ -152,12 +155,13 @@ def _least_effort(
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
     moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
-    released, scaled, (tolerance, most, sided) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
+    released, scaled, (tolerance, most, others) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
     let_go = np.empty(rows, dtype=np.bool_)  # rows that were
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
-        if sided:
+        if others:
+            evaluate_others(chain, goals, room)
             _activate(goals, room)
         left = 0.0
         for r in range(rows):
@@ -165,6 +169,8 @@ def _least_effort(
             let_go[r] = False
         left = np.sqrt(left)
         rows_of(chain, goals, room)
+        if others:
+            rows_of_others(chain, goals, room)
         for i in range(size):
             room.free[i], released[i], shift[i] = True, False, nearest[0, i] - q[i]
         changed = True
@@ -173,7 +179,7 @@ def _least_effort(
                 right[r] = room.value[r] if room.active[r] else 0.0
                 for i in range(size if room.active[r] else 0):
                     right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
-            _fill_normal(room, nearest[1], 1e-12, scaled, system, sided)
+            _fill_normal(room, nearest[1], 1e-12, scaled, system, others)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -183,7 +189,7 @@ def _least_effort(
                         dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
             changed = _hold_first(chain, room.free, q, dq)
             if not changed:
-                row = _next_row(goals, room, dq, right) if sided else -1
+                row = _next_row(goals, room, dq, right) if others else -1
                 changed = row >= 0 and not (room.active[row] and let_go[row])
                 if changed:
                     let_go[row] = let_go[row] or room.active[row]
@@ -240,7 +246,7 @@ def _next_row(goals: Goals, room: Room, dq: Array, multipliers: Array) -> int:
 
 
 @compiled(inner=True, error_model="numpy")
-def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array, sided: bool) -> None:
+def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array, others: bool) -> None:
     """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,); `scaled` is room."""
     for r in range(len(system)):
         for i in range(len(weights)):
@@ -248,7 +254,7 @@ def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, syst
     gram(scaled, room.jacobian, len(system), system)
     for r in range(len(system)):
         system[r, r] += damping
-    for r in range(len(system) if sided else 0):
+    for r in range(len(system) if others else 0):
         if not room.active[r]:
             for s in range(len(system)):
                 system[max(r, s), min(r, s)] = 1.0 if r == s else 0.0
