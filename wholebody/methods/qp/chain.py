@@ -176,7 +176,8 @@ class Descents:
         self.trace: list[TraceEntry] = []
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
-        self.ends: list[tuple[float, Array]] = []  # effort and values (n,) of all such ends
+        self.ends: list[tuple[float, Array]] = []  # effort and values (n,) of such ends
+        self.left = np.inf  # least effort of those that are led to no contacts
 
     def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
         """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
@@ -252,21 +253,22 @@ class Descents:
             return met
         contacts, at = self._contacts(), self.asked.at
         best, most = met, np.inf if met is None else self._effort(met.q)
-        tried, known = list[Array](), True
+        tried = list[Array]()
         for effort, values in sorted(self.ends, key=lambda each: each[0]):
             if effort >= SEEDS.worth * most or len(tried) == SEEDS.near:
                 break
             if any(np.abs(values - each).max() < SEEDS.differing for each in tried):
                 continue
             tried.append(values)
-            found = contacts.least(values, most)
-            known = known and found is not None
-            if found is not None and found[0].effort < most:
+            if (found := contacts.least(values, most)) is None:
+                self.left = min(self.left, effort)
+            else:
                 best, most = Met(self.chain.posture(found[0].values, at), tuple(self.trace), found[1]), found[0].effort
         self.ends = []
         if best is None:
             return None
-        return with_values(best, blocked=None if known else self.blocked, through=self.blocked)
+        blocked = self.blocked if self.left < SEEDS.worth * most else None
+        return with_values(best, blocked=blocked, through=self.blocked)
 
     def _contacts(self) -> AtContacts:
         goals, at, nearest, clearances, *_ = self.asked
@@ -282,13 +284,14 @@ class Descents:
         for values in seeds[found[0, :, 1] < np.inf]:
             if not self._is_free(q := self.chain.posture(values, at)):
                 continue
-            tried, best = tried + 1, best or Met(at, tuple(self.trace), False, free=q, through=self.blocked)
+            tried += 1
             look = None if self.asked.bounded or self.asked.own else contacts.least(values, most)
-            if look is not None and look[0].effort < most:
-                q, most = self.chain.posture(look[0].values, at), look[0].effort
-                if self.least >= SEEDS.worth * most:
+            if look is not None:
+                q = self.chain.posture(look[0].values, at)
+                if self.least >= SEEDS.worth * look[0].effort:
                     return Met(q, tuple(self.trace), look[1], through=self.blocked)
-                best = with_values(best, free=q)
+            if self._effort(q) < most:
+                best, most = Met(at, tuple(self.trace), False, free=q, through=self.blocked), self._effort(q)
             if tried == SEEDS.compared:
                 break
         return best
