@@ -68,17 +68,20 @@ class AtContacts(NamedTuple):
 
     def _descended(self, values: Array, planes: list[Planes]) -> tuple[Array, float]:
         """Values (n,) of least effort beyond planes, and that effort, inf where none are found."""
-        goals, end = self.goals, values[None, None].copy()
+        goals, end = self._beyond(planes), values[None, None].copy()
+        found, _ = self.chain.descents(goals.tables[None], goals, self.nearest[None], self.asked, end, 1)
+        return end[0, 0], float(found[0, 0, 1]) if found[0, 0, 2] > 0.0 else np.inf
+
+    def _beyond(self, planes: list[Planes]) -> Goals:
+        """The goals, with planes."""
         tables, entries = (np.concatenate(parts) for parts in zip(*planes, strict=True))
-        rows = len(goals.one_sided) + np.arange(len(tables))
-        goals = with_values(
+        goals, rows = self.goals, len(self.goals.one_sided) + np.arange(len(tables))
+        return with_values(
             goals,
             plane_tables=np.concatenate([goals.plane_tables, tables]),
             plane_entries=np.concatenate([goals.plane_entries, np.column_stack([rows, entries])]),
             one_sided=np.concatenate([goals.one_sided, np.ones(len(rows), dtype=bool)]),
         )
-        found, _ = self.chain.descents(goals.tables[None], goals, self.nearest[None], self.asked, end, 1)
-        return end[0, 0], float(found[0, 0, 1]) if found[0, 0, 2] > 0.0 else np.inf
 
     def _planes(self, near: Contacts, gaps: Array) -> Planes:
         """Planes of the nearest pairs."""

@@ -14,8 +14,9 @@ from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.methods.conclusion import assessed_tolerance
 from wholebody.methods.control import Control
-from wholebody.methods.qp.chain import Asked, Descents, Rule, chains_of, distance_of, goal_entries, how_far
+from wholebody.methods.qp.chain import Descents
 from wholebody.methods.qp.chain_goals_kernel import Goals
+from wholebody.methods.qp.chain_problem import Asked, Rule, chains_of, distance_of, goal_entries, how_far
 from wholebody.methods.qp.plain_chain import FIRST, PlainChain
 from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem

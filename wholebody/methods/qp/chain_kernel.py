@@ -7,7 +7,15 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.base.dense_kernel import copy, dot, gram, solve
-from wholebody.methods.qp.chain_goals_kernel import Chain, Goals, Room, evaluate, evaluate_others, rows_of, rows_of_others
+from wholebody.methods.qp.chain_goals_kernel import (
+    Chain,
+    Goals,
+    Room,
+    evaluate,
+    evaluate_others,
+    rows_of,
+    rows_of_others,
+)
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
 
 CLEARLY, NEAR = 1.25, 0.3

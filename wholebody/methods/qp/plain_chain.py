@@ -56,7 +56,9 @@ class PlainChain:
         self._known: dict[Hashable, tuple[Any, ...]] = {}  # see `goals`
         inertias = [model.inertias[joint] for joint in joints]
         self.joints, self._bodies = np.array([0, *joints]), np.zeros((len(joints) + 1, 4))
-        above = [[number[one] for one in list(model.supports[joint]) if one in number] for joint in range(model.njoints)]
+        above = [
+            [number[one] for one in list(model.supports[joint]) if one in number] for joint in range(model.njoints)
+        ]
         self.carriers = np.array([every[-1] for every in above])
         self._bodies[1:] = [[inertia.mass, *(inertia.mass * inertia.lever)] for inertia in inertias]
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
@@ -324,7 +326,11 @@ def compiled_kernel(_: Any) -> None:
     )  # fmt: skip
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
     bodies, near, efforts = (chain, _NO_ARM, room), np.zeros((0, 2, 1)), np.empty((0, 2))
-    tables = [np.zeros((0, width), kind) for widths in WIDTHS.values() for width, kind in zip(widths, (float, np.int64))]
+    tables = [
+        np.zeros((0, width), kind)
+        for widths in WIDTHS.values()
+        for width, kind in zip(widths, (float, np.int64), strict=True)
+    ]
     goals = Goals(*tables, np.zeros((2, 4)), np.zeros(0, np.bool_))
     chain_kernel.reach_all(
         bodies, np.zeros(5), (np.zeros((0, 0, 36)), goals), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
