@@ -326,7 +326,7 @@ def compiled_kernel(_: Any) -> None:
     )  # fmt: skip
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
     bodies, near, efforts = (chain, _NO_ARM, room), np.zeros((0, 2, 1)), np.empty((0, 2))
-    tables = [
+    tables: Any = [
         np.zeros((0, width), kind)
         for widths in WIDTHS.values()
         for width, kind in zip(widths, (float, np.int64), strict=True)
