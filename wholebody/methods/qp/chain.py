@@ -98,6 +98,7 @@ class Descents:
         self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
         self.within = float(np.maximum.reduce(asked.clearances, initial=0.0))
         self.trace: list[TraceEntry] = []
+        self.met = 0  # ends that meet the goals
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
         self.ends: list[tuple[float, Array]] = []  # effort and values (n,) of such ends
@@ -134,6 +135,7 @@ class Descents:
                 settled = self.chain.arm is not None and not self.asked.bounded and not self.asked.goals.one_sided.any()
                 return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
+        best = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
             if self.measured < self.rule.measured:
                 met = self._from_free(seeds)
@@ -146,12 +148,16 @@ class Descents:
                     left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
                     met = self._ended(left, enough, others=True)
             met = self._at_contacts(met)
-            if met is not None or self.control.over:
-                return met
+            if met is not None and (best is None or self._effort(met.q) < self._effort(best.q)):
+                best = met
+            # Where few seeds lead to the goals, the next ones may lead to less effort.
+            few = self.measured and self.met < SEEDS.compared and number < SEEDS.sparse
+            if (best is not None and not few) or self.control.over:
+                return best
             redundant = self.measured and len(self.start) > self.rule.rows
             if number == SEEDS.weighed and redundant and self.blocked is not None:
                 self.measured = False  # ends of least effort gather at the same places: of others more are free
-        return None
+        return best
 
     def _or_from_random(self, met: Met | None) -> Met | None:
         """An end, or one of less effort from the first random seeds."""
@@ -280,6 +286,7 @@ class Descents:
         """Of ends (k, n) and what was found there (k, 4) the free one of least effort; None where none is."""
         chain, ends = self.chain, found.tolist()
         for left, _, _, steps in ends:
+            self.met += left <= self.settings.tolerance
             if steps and not self.control.reason:
                 self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
                 self.control.tell(self.trace[-1])
