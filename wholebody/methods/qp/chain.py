@@ -102,6 +102,7 @@ class Descents:
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
         self.ends: list[tuple[float, Array]] = []  # effort and values (n,) of such ends
+        self.tried: list[Array] = []  # those (n,) that were led to contacts
         self.left = np.inf  # least effort of those that are led to no contacts
 
     def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
@@ -183,13 +184,13 @@ class Descents:
             return met
         contacts, at = self._contacts(), self.asked.at
         best, most = met, np.inf if met is None else self._effort(met.q)
-        tried = list[Array]()
+        before = len(self.tried)
         for effort, values in sorted(self.ends, key=lambda each: each[0]):
-            if effort >= SEEDS.worth * most or len(tried) == SEEDS.near:
+            if effort >= SEEDS.worth * most or len(self.tried) == before + SEEDS.near:
                 break
-            if any(np.abs(values - each).max() < SEEDS.differing for each in tried):
+            if any(np.abs(values - each).max() < SEEDS.differing for each in self.tried):
                 continue
-            tried.append(values)
+            self.tried.append(values)
             if (found := contacts.least(values, most)) is None:
                 self.left = min(self.left, effort)
             else:
