@@ -331,7 +331,7 @@ def compiled_kernel(_: Any) -> None:
         for widths in WIDTHS.values()
         for width, kind in zip(widths, (float, np.int64), strict=True)
     ]
-    goals = Goals(*tables, np.zeros((2, 4)), np.zeros(0, np.bool_))
+    goals = Goals(*(*tables, np.zeros((2, 4)), np.zeros(0, np.bool_)))
     chain_kernel.reach_all(
         bodies, np.zeros(5), (np.zeros((0, 0, 36)), goals), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
         np.zeros(0, dtype=np.intp),
