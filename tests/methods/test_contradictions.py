@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wholebody as wb
 from tests.needs import each
+from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import contradictions
@@ -289,3 +291,51 @@ def test_a_hold_where_the_start_is_not_is_taken_at_its_word(free_bodies):
     beside = wb.Hold("body0", at=pin.SE3(np.eye(3), np.array([0.7, 0.0, 0.0])))
     assert len(found(wb.Problem(scene, constraints=[into]))) == 1
     assert found(wb.Problem(scene, constraints=[beside])) == ()
+
+
+def test_a_piece_that_a_placement_puts_into_a_thing_is_a_proof():
+    """No displacement of less than the bound frees it, by coal on random ones; free postures contradict nothing."""
+    figure, start = robots.known_arm("ur5")
+    rng, proven, joint = np.random.default_rng(6), 0, figure.model.frames[figure.frame_id("tool")].parentJoint
+    own = [k for k, body in enumerate(figure.geometry.geometryObjects) if body.parentJoint == joint]
+    for number in range(40):
+        there = rng.uniform(figure.limits.lower, figure.limits.upper)
+        place = figure.placement(there, "tool")
+        at = place.act(rng.uniform(-0.08, 0.08, 3))
+        size = rng.uniform(0.02, 0.15, 3)
+        scene = wb.Scene(figure).add(wb.Box(size), name="box", at=at)
+        clearance = 0.004 * (number % 2)
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)], clearance=clearance)
+        free = not any("box" in (pair.a, pair.b) for pair in scene.penetration(there))
+        entries = [one for one in found(problem) if "into box" in one.text]
+        assert not (entries and free and not clearance)
+        for one in entries:
+            proven += 1
+            assert one.status == "unreachable"
+            box = coal.Box(*size)
+            for _ in range(60):
+                move = rng.normal(size=6)
+                move *= 0.999 * one.least / np.linalg.norm(move)
+                moved = pin.SE3(place.rotation @ pin.exp3(move[3:]), place.translation + move[:3])
+                joint_at = moved * figure.model.frames[figure.frame_id("tool")].placement.inverse()
+                gaps = []
+                for body in (figure.geometry.geometryObjects[k] for k in own):
+                    piece = joint_at * body.placement
+                    gaps.append(
+                        coal.distance(
+                            body.geometry, coal.Transform3s(piece.rotation, piece.translation), box,
+                            coal.Transform3s(np.eye(3), at), coal.DistanceRequest(), coal.DistanceResult(),
+                        )
+                    )  # fmt: skip
+                assert min(gaps) < clearance + 1e-5
+    assert proven > 5
+
+
+def test_six_joints_inside_a_thing_say_so():
+    """What a closed form knows to be blocked names the contradiction, as other arms do."""
+    figure, start = robots.known_arm("ur5")
+    place = figure.placement(np.array([0.3, -1.0, 1.2, -0.4, 0.6, 0.2]), "tool")
+    scene = wb.Scene(figure).add(wb.Box((0.4, 0.4, 0.4)), name="box", at=place.translation)
+    solution = wb.solve(wb.Problem(scene, start, goals=[wb.Frame("tool", place)]))
+    assert solution.status == "unreachable"
+    assert "contradicts itself" in solution.message

@@ -236,6 +236,30 @@ class _Finder:
             if thing >= 0 and (number not in self.missed or deepest > self.missed[number].least):
                 text = f"{name}, is in {self._workspace.owners[thing]}, {1e3 * deepest:.3g} mm from where it can be"
                 self.missed[number] = Contradiction("unreachable", text, deepest)
+            elif thing < 0 and number not in self.missed and isinstance(goal := self._problem.goals[number], Frame):
+                self._placed_inside(number, name, goal, found)
+
+    def _placed_inside(self, number: int, name: str, goal: Frame, found: Place) -> None:
+        """Find a piece of a frame's joint that the frame's placement puts into a thing."""
+        # A ball in the piece leaves the thing when its centre moves by `much`, which the frame's displacement and its
+        # rotation vector do together, at most by the displacement and the vector's length times the distance.
+        table, geometry = self._workspace.table, self._workspace.geometry
+        at = goal.residual.placement * found.placement.inverse()
+        for pair, (a, b) in enumerate(table.pairs.tolist() if found.joint else ()):
+            own, other = (a, b) if table.joint[a] == found.joint else (b, a)
+            if table.joint[own] != found.joint or table.joint[other] != 0:
+                continue
+            centre = geometry.geometryObjects[own].placement.translation
+            reached = np.linalg.norm(at.act(centre) - geometry.geometryObjects[other].placement.translation)
+            if not 0.0 < (inner := self._depth(own, centre)) < np.inf or reached > table.reach[other] + inner:
+                continue
+            much = inner + self._depth(other, at.act(centre)) + float(self._problem.clearances[pair])
+            away = float(np.linalg.norm(centre - found.placement.translation))
+            least = much / float(np.hypot(1.0, away))
+            if much > CLEAR and (number not in self.missed or least > self.missed[number].least):
+                piece, thing = self._workspace.owners[own], self._workspace.owners[other]
+                text = f"{name}, puts {piece} into {thing}, at least {1e3 * much:.3g} mm"
+                self.missed[number] = Contradiction("unreachable", text, least)
 
     def _depth(self, index: int, point: Array) -> float:
         """Depth of a point (3,) inside a piece, metres, both in the frame of the piece's joint."""

@@ -11,7 +11,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets import robots
 from wholebody.methods.qp.along_branches import Along, Look
-from wholebody.methods.qp.chain import chains_of, goal_entries, how_far
+from wholebody.methods.qp.chain_problem import chains_of, goal_entries, how_far
 from wholebody.methods.starts import restarts
 
 

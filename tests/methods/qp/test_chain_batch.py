@@ -8,6 +8,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.assessment.posture import Numbers, judged_postures
+from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.methods.qp.chain_kernel import reach_all
 from wholebody.tasks.base import Goal
@@ -51,6 +52,23 @@ def test_answers_are_those_of_solves_one_by_one(scene, kind):
         assert (record.outcome, record.message, record.iterations) == (alone.status, alone.message, alone.iterations)
         for name in ("goal_error", "goal_angle", "penetration", "limit_violation", "measure"):
             assert getattr(record, name) == pytest.approx(getattr(alone.assessment, name), abs=1e-12)
+
+
+def test_rows_that_are_the_same_leave_joints_free_in_batches_too():
+    """Seven joints have room at nine rows of rank six: what is in the way counts as in solves one by one."""
+    figure, start = robots.known_arm("panda")
+    scene, rng, problems = wb.Scene(figure), np.random.default_rng(0), []
+    for number, at in enumerate([(0.35, 0.0, 0.75), (0.2, 0.3, 0.5), (0.2, -0.3, 0.5)]):
+        scene.add(wb.Sphere(0.08), name=f"ball {number}", at=at)
+    while len(problems) < 40:
+        there = rng.uniform(figure.limits.lower, figure.limits.upper)
+        if not scene.penetration(there):
+            at = figure.placement(there, "tool")
+            other = wb.Point("tool", at.act(np.array([0.0, 0.0, 0.1])), offset=(0.0, 0.0, 0.1))
+            goals = [wb.Point("tool", at.translation), wb.Orientation("tool", at.rotation), other]
+            problems.append(wb.Problem(scene, start, goals=goals))
+    for problem, record in zip(problems, wb.solve_many(problems), strict=True):
+        np.testing.assert_array_equal(record.q, wb.solve(problem).q)
 
 
 def test_answers_are_where_pinocchio_has_the_tool(scene, arm):

@@ -10,11 +10,11 @@ import scipy.optimize
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Limits
-from wholebody.methods.qp.chain import goal_entries
-from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.chain_goals_kernel import Goals
+from wholebody.methods.qp.chain_problem import goal_entries
 from wholebody.methods.qp.closed_form import compiled_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES
-from wholebody.methods.qp.plain_chain import Chains, PlainChain
+from wholebody.methods.qp.plain_chain import WIDTHS, Chains, PlainChain
 from wholebody.methods.qp.settings import SEEDS
 from wholebody.terms.entries import placement_floats
 
@@ -34,8 +34,12 @@ ARMS = {
 
 def placed(table: np.ndarray) -> Goals:
     """One placement with such floats (36,)."""
-    integers = np.zeros((1, 6), dtype=np.int64)
-    return Goals(table[None], integers, np.zeros((0, 24)), integers[:0, :3])
+    nothing = [
+        np.zeros((0, width), kind)
+        for widths in [*WIDTHS.values()][1:]
+        for width, kind in zip(widths, (float, np.int64), strict=True)
+    ]
+    return Goals(table[None], np.array([[0, 0, 0, 1, 1, 0]]), *nothing, np.zeros((1, 4)), np.zeros(6, dtype=bool))
 
 
 def arm(name: str, rng: np.random.Generator, most: float = 2.0 * np.pi) -> tuple[pin.Model, PlainChain]:

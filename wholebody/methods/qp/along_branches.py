@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.chain_goals_kernel import Goals
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import PlainChain
 from wholebody.methods.qp.settings import SEEDS

@@ -7,7 +7,8 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.base.dense_kernel import copy
-from wholebody.methods.qp.chain_kernel import Chain, Goals, Room, reach
+from wholebody.methods.qp.chain_goals_kernel import Chain, Goals, Room
+from wholebody.methods.qp.chain_kernel import reach
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, Arm, beside
 
 

@@ -5,30 +5,23 @@ Seeds are the branches of the closed form of an arm that has one, else the start
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
-from wholebody import tasks
 from wholebody.base.arrays import Array, with_values
-from wholebody.base.pool import Pool
 from wholebody.methods.control import Control
 from wholebody.methods.qp.along_branches import Along
-from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.at_contacts import AtContacts
+from wholebody.methods.qp.chain_problem import Asked, Rule, chains_of, distance_of, goal_entries, how_far, is_free
 from wholebody.methods.qp.closed_form import Branches
-from wholebody.methods.qp.plain_chain import FIRST, NEARBY, Chains, PlainChain, rows_of
+from wholebody.methods.qp.plain_chain import FIRST, NEARBY, PlainChain, rows_of
 from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
-from wholebody.tasks.answers import is_own
-from wholebody.tasks.base import Constraint, Goal, Term
-from wholebody.tasks.checks import is_equality, undefined
-from wholebody.tasks.distance import SquaredDistance
-from wholebody.terms.entries import AXIS, RESIDUAL, Entry, entries_of
+from wholebody.tasks.checks import undefined
 
 
 class Met(NamedTuple):
@@ -54,26 +47,6 @@ class Met(NamedTuple):
         return self.stationary and self.blocked is None and not self.near
 
 
-def chains_of(problem: Problem) -> Pool[Chains]:
-    """What runs on problems of a figure borrow: things around it change no chain."""
-    figure = problem.scene.figure
-    return figure.runs.pool(Chains, lambda: Chains(figure.model, figure.limits))
-
-
-def goal_entries(problem: Problem) -> list[Entry] | None:
-    """Entries of goals and equalities, if these are places, rotations and axes; None otherwise."""
-    if not problem.goals or any(type(one) is not tasks.Freeze for one in problem.bounds):
-        return None
-    found: list[Entry] = []
-    terms: tuple[Goal | Constraint, ...] = (*problem.goals, *filter(is_equality, problem.constraints))
-    for term in terms:
-        entries = entries_of(term, problem.scene.model)
-        if entries is None or any(entry.table not in (RESIDUAL, AXIS) for entry in entries):
-            return None
-        found += entries
-    return found
-
-
 def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, control: Control) -> Met | None:
     """A posture that meets the goals with everything held, the best of the first few; None for other terms."""
     entries = goal_entries(problem)
@@ -88,29 +61,6 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
         asked = Asked.by(problem, chain, entries, distance)
         rule = Rule.of(chain, asked.goals, settings, distance is not None)
         return Descents(asked, chain, rule, workspace, settings, control).run()
-
-
-class Asked(NamedTuple):
-    """What a problem asks of a chain."""
-
-    goals: Goals
-    at: Array  # (nq,) its start, within limits
-    nearest: Array  # (2, n) posture from which the measure is a squared distance, and weights; zeros for none
-    clearances: Array  # (pairs,) metres
-    bounded: tuple[Constraint, ...] = ()  # inequalities, which reject ends
-    own: tuple[Term, ...] = ()  # terms of one's own, which may be undefined at some postures
-
-    @classmethod
-    def by(cls, problem: Problem, chain: PlainChain, entries: list[Entry], distance: SquaredDistance | None) -> Asked:
-        """What a problem with these entries asks, whose measure is a squared distance; None where none counts."""
-        at = problem.scene.figure.clamp(problem.start)
-        nearest = np.zeros((2, len(chain.idx_v)))
-        nearest[0] = chain.angles(at if distance is None else distance.reference)
-        if distance is not None:
-            nearest[1] = distance.weights[chain.idx_v]
-        bounded = tuple(one for one in problem.constraints if not is_equality(one))
-        own = tuple(one for one in (*problem.constraints, *problem.measures) if is_own(one))
-        return cls(chain.goals(entries), at, nearest, problem.clearances, bounded, own)
 
 
 def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
@@ -148,8 +98,12 @@ class Descents:
         self.start, self.rule, self.measured = chain.angles(asked.at), rule, rule.measured
         self.within = float(np.maximum.reduce(asked.clearances, initial=0.0))
         self.trace: list[TraceEntry] = []
+        self.met = 0  # ends that meet the goals
         self.least = np.inf  # effort of an end that does not keep its clearances
         self.blocked: Array | None = None
+        self.ends: list[tuple[float, Array]] = []  # effort and values (n,) of such ends
+        self.tried: list[Array] = []  # those (n,) that were led to contacts
+        self.left = np.inf  # least effort of those that are led to no contacts
 
     def run(self, first: tuple[Array, Array] | None = None) -> Met | None:
         """The answer of the batches in turn: the closed form's ends, its samples, random seeds; `first`: ends known."""
@@ -179,11 +133,14 @@ class Descents:
             if met is not None:
                 # What a bent arm misses in its effort, descents of the whole problem find.
                 # An end of an exact arm that did not come to rest at its limits takes at most a per cent more.
-                settled = self.chain.arm is not None and not self.asked.bounded
+                settled = self.chain.arm is not None and not self.asked.bounded and not self.asked.goals.one_sided.any()
                 return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
+        best = None
         for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
-            if first is None:
+            if self.measured < self.rule.measured:
+                met = self._from_free(seeds)
+            elif first is None:
                 met = self._ended(seeds, enough)
             else:
                 (ends, found), first = first, None
@@ -191,16 +148,17 @@ class Descents:
                 if met is None and not self.control.over:
                     left = np.concatenate([ends[found[:, 2] < 0.0], seeds[len(ends) :]])
                     met = self._ended(left, enough, others=True)
-            if met is not None and self.rule.measured and not self.measured:
-                return Met(self.asked.at, met.trace, False, free=met.q, through=self.blocked)
-            if met is not None or self.control.over:
-                return met
+            met = self._at_contacts(met)
+            if met is not None and (best is None or self._effort(met.q) < self._effort(best.q)):
+                best = met
+            # Where few seeds lead to the goals, the next ones may lead to less effort.
+            few = self.measured and self.met < SEEDS.compared and number < SEEDS.sparse
+            if (best is not None and not few) or self.control.over:
+                return best
             redundant = self.measured and len(self.start) > self.rule.rows
             if number == SEEDS.weighed and redundant and self.blocked is not None:
-                # Ends of least effort gather at the same places: of others more are free.
-                enough, self.measured = 1, False
-                self.asked = with_values(self.asked, nearest=self.asked.nearest * [[1.0], [0.0]])
-        return None
+                self.measured = False  # ends of least effort gather at the same places: of others more are free
+        return best
 
     def _or_from_random(self, met: Met | None) -> Met | None:
         """An end, or one of less effort from the first random seeds."""
@@ -213,12 +171,61 @@ class Descents:
     def _along_branches(self, branches: Branches, most: float) -> Array | None:
         """The free posture (nq,) of less effort than `most`, and the least, along the branches; None where none is."""
         goals, at, nearest, clearances, bounded, _ = self.asked
-        if bounded:
+        if bounded or goals.one_sided.any():
             return None  # intervals of branches end where things are in the way, and not where inequalities do
         asked = how_far(self.settings, 1, others=True)
         along = Along(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
         found = along.least(branches, most)
         return None if found is None else self.chain.posture(found.values, at)
+
+    def _at_contacts(self, met: Met | None) -> Met | None:
+        """An end, or one of less effort where blocked ends are led to contacts."""
+        if not self.measured or self.asked.bounded or self.asked.own or not self.ends or not self._is_redundant():
+            return met
+        contacts, at = self._contacts(), self.asked.at
+        best, most = met, np.inf if met is None else self._effort(met.q)
+        before = len(self.tried)
+        for effort, values in sorted(self.ends, key=lambda each: each[0]):
+            if effort >= SEEDS.worth * most or len(self.tried) == before + SEEDS.near:
+                break
+            if any(np.abs(values - each).max() < SEEDS.differing for each in self.tried):
+                continue
+            self.tried.append(values)
+            if (found := contacts.least(values, most)) is None:
+                self.left = min(self.left, effort)
+            else:
+                best, most = Met(self.chain.posture(found[0].values, at), tuple(self.trace), found[1]), found[0].effort
+        self.ends = []
+        if best is None:
+            return None
+        blocked = self.blocked if self.left < SEEDS.worth * most else None
+        return with_values(best, blocked=blocked, through=self.blocked)
+
+    def _contacts(self) -> AtContacts:
+        goals, at, nearest, clearances, *_ = self.asked
+        asked = how_far(self.settings, 1, others=True)
+        return AtContacts(self.chain, goals, at, nearest, clearances, self.within, self.workspace, asked)
+
+    def _from_free(self, seeds: Array) -> Met | None:
+        """The least effort at contacts from the first free ends of descents without it; None where none is free."""
+        (goals, at, nearest, *_), asked = self.asked, how_far(self.settings, len(seeds), others=True)
+        known = (nearest * [[1.0], [0.0]])[None]
+        found, _ = self.chain.descents(goals.tables[None], goals, known, asked, seeds[None], len(seeds))
+        contacts, best, most, tried = self._contacts(), None, np.inf, 0
+        for values in seeds[found[0, :, 1] < np.inf]:
+            if not self._is_free(q := self.chain.posture(values, at)):
+                continue
+            tried += 1
+            look = None if self.asked.bounded or self.asked.own else contacts.least(values, most)
+            if look is not None:
+                q = self.chain.posture(look[0].values, at)
+                if self.least >= SEEDS.worth * look[0].effort:
+                    return Met(q, tuple(self.trace), look[1], through=self.blocked)
+            if self._effort(q) < most:
+                best, most = Met(at, tuple(self.trace), False, free=q, through=self.blocked), self._effort(q)
+            if tried == SEEDS.compared:
+                break
+        return best
 
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
@@ -280,6 +287,7 @@ class Descents:
         """Of ends (k, n) and what was found there (k, 4) the free one of least effort; None where none is."""
         chain, ends = self.chain, found.tolist()
         for left, _, _, steps in ends:
+            self.met += left <= self.settings.tolerance
             if steps and not self.control.reason:
                 self.trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
                 self.control.tell(self.trace[-1])
@@ -292,6 +300,7 @@ class Descents:
                 return Met(q, tuple(self.trace), known, self.blocked if free else None, through=self.blocked)
             if not self._is_defined(q):
                 return Met(self.asked.at, tuple(self.trace), False)  # descents from the start end at the edge
+            self.ends.append((effort, seeds[k].copy()))
             self.least, self.blocked = (effort, q) if effort < self.least else (self.least, self.blocked)
         return None
 
@@ -310,70 +319,10 @@ class Descents:
 
     def _is_redundant(self) -> bool:
         """Whether joints move where the goals are met: rows of several terms may be the same."""
-        rows = self.chain.room(self.rule.rows).jacobian  # at the last end
+        goals = self.asked.goals
+        rows = self.chain.room(rows_of(goals)).jacobian[~goals.one_sided]  # at the last end
         return len(self.start) > len(rows) or bool(np.linalg.matrix_rank(rows, 1e-3) < len(self.start))  # m, rad a rad
 
     def _is_defined(self, q: Array) -> bool:
         own = self.asked.own
         return not own or undefined(own, self.workspace.state.update(q)) is None
-
-
-def how_far(settings: Settings, enough: int, others: bool = False) -> Array:
-    """Numbers (5,) of `chain_kernel.reach`; `others`: those too that will take more effort than what is found."""
-    return _how_far(settings.tolerance, min(settings.iterations, SEEDS.steps), enough, others)
-
-
-@lru_cache(maxsize=64)
-def _how_far(tolerance: float, steps: int, enough: int, others: bool) -> Array:
-    return np.array([tolerance, SEEDS.damping**2, steps, enough, 0.0 if others else 1.0])
-
-
-class Rule(NamedTuple):
-    """How the first batch of seeds is descended from."""
-
-    guided: bool  # whether it is of the branches of a closed form
-    held: bool  # with one joint held, so that ends lie along branches
-    finite: bool  # whether ends are isolated, and the closed form has all of them
-    enough: int  # ends that meet the goals
-    rows: int  # of the goals
-    together: int  # seeds of a batch of random ones
-    measured: bool  # whether ends are compared by a measure
-    nearly: bool  # whether the closed form is only near to postures, and lacks some of an arm that is stretched
-
-    def lacks(self, count: int) -> bool:
-        """Whether so many ends of a closed form are too few to compare."""
-        return self.nearly and count < self.enough
-
-    @classmethod
-    def of(cls, chain: PlainChain, goals: Goals, settings: Settings, measured: bool) -> Rule:
-        """The rule for problems with such goals."""
-        guided, more = chain.is_guided(goals), 1 + settings.restarts_for_measure
-        held = guided and chain.held >= 0
-        finite = guided and not held and chain.arm is not None
-        enough = 1 if finite or not measured else SEEDS.compared * more + (chain.first if guided else 0)
-        nearly = guided and chain.arm is None and measured
-        return cls(guided, held, finite, enough, rows_of(goals), SEEDS.together * more, measured, nearly)
-
-
-def is_free(workspace: Workspace, q: Array, clearances: Array, within: float) -> bool:
-    """Whether every pair keeps its clearance (pairs,), at most `within` metres, at a posture (nq,)."""
-    return workspace.least_gap(q, clearances, within) >= 0.0
-
-
-def distance_of(problem: Problem, chain: PlainChain) -> SquaredDistance | None:
-    """The measure, where it is one squared distance that the other joints cannot reduce; else None."""
-    measures = problem.measures
-    if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
-        return None
-    distance: SquaredDistance = measures[0].distance  # type: ignore[attr-defined]
-    if np.count_nonzero(distance.weights[chain.idx_v]) < len(chain.idx_v):
-        return None
-    if len(chain.idx_v) == len(distance.weights):
-        return distance
-    weights = distance.weights.copy()
-    weights[chain.idx_v] = 0.0
-    if not weights.any():
-        return distance
-    at = problem.scene.figure.clamp(problem.start)
-    rest = weights * pin.difference(problem.scene.model, distance.reference, at)
-    return None if rest.any() else distance

@@ -14,8 +14,9 @@ from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.base.errors import InputError
 from wholebody.methods.conclusion import assessed_tolerance
 from wholebody.methods.control import Control
-from wholebody.methods.qp.chain import Asked, Descents, Rule, chains_of, distance_of, goal_entries, how_far
-from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.chain import Descents
+from wholebody.methods.qp.chain_goals_kernel import Goals
+from wholebody.methods.qp.chain_problem import Asked, Rule, chains_of, distance_of, goal_entries, how_far
 from wholebody.methods.qp.plain_chain import FIRST, PlainChain
 from wholebody.methods.qp.settings import SEEDS, Settings
 from wholebody.problem import Problem
@@ -158,6 +159,7 @@ class _First:
     angles: Array  # (k, m, n) the ends
     known: Array  # (k, m, 4) what was found there, see `chain_kernel.reach`
     counts: Indices  # (k,) how many
+    isolated: bool  # whether no joint moves where the goals are met
 
     @classmethod
     def of(cls, batch: Batch, chain: PlainChain, entries: list[Entry]) -> _First:
@@ -177,7 +179,10 @@ class _First:
         for k in range(len(at) if together else 0):
             ends[k] = next(chain.seeds(chain.angles(at[k]), settings.seed, together))
         found, counts = chain.descents(batch.tables, goals, nearest, how_far(settings, rule.enough), ends, together)
-        return cls(batch, chain, goals, rule, at, nearest, ends, found, np.maximum(counts, 0))
+        isolated, rows = nearest.shape[2] <= rule.rows, chain.room(rule.rows).jacobian  # at the last end
+        if isolated and not rule.guided:  # rows of several terms may be the same
+            isolated = bool(np.linalg.matrix_rank(rows, 1e-3) == nearest.shape[2])  # m, rad a rad
+        return cls(batch, chain, goals, rule, at, nearest, ends, found, np.maximum(counts, 0), isolated)
 
     @cached_property
     def effort(self) -> Array:
@@ -195,6 +200,10 @@ class _First:
         rows, least = np.arange(len(self.at)), self.order[:, 0]
         ended = (self.effort[rows, least] < np.inf) & (self.known[rows, least, 2] != 0.0)
         ended &= ~np.array([self.rule.lacks(count) for count in self.counts.tolist()], dtype=bool)
+        if self.rule.measured and not self.rule.guided:  # where few seeds lead to the goals more are compared
+            taken = np.arange(self.known.shape[1]) < self.counts[:, None]
+            met = taken & (self.known[:, :, 0] <= self.batch.settings.tolerance)
+            ended &= met.sum(axis=1) >= SEEDS.compared
         q = self.at.copy()
         q[ended] = self.postures(np.flatnonzero(ended), 0)
         counted = (np.arange(self.known.shape[1]) < self.counts[:, None]) & (self.known[:, :, 3] != 0.0)
@@ -208,8 +217,7 @@ class _First:
         """Whether (k,) no descent can lead to less than the end with this rank, where those before it are not free."""
         rows, here = np.arange(len(self.at)), self.order[:, rank]
         effort = self.effort[rows, here]
-        isolated = self.nearest.shape[2] <= self.rule.rows
-        near = isolated | ~(self.effort[rows, self.order[:, 0]] < SEEDS.worth * effort)
+        near = self.isolated | ~(self.effort[rows, self.order[:, 0]] < SEEDS.worth * effort)
         complete: Mask = near & (effort < np.inf) & (self.known[rows, here, 2] != 0.0)
         return complete
 

@@ -2,54 +2,26 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.base.dense_kernel import copy, dot, gram, solve
+from wholebody.methods.qp.chain_goals_kernel import (
+    Chain,
+    Goals,
+    Room,
+    evaluate,
+    evaluate_others,
+    rows_of,
+    rows_of_others,
+)
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, FULL, Arm, foreseen, sampled
-from wholebody.terms.entries import Integers
-from wholebody.terms.residual_kernel import axis_errors, residuals
 
 CLEARLY, NEAR = 1.25, 0.3
 """An end of less than this many radians or metres away is left where it will take this many times another's effort."""
 HARDLY = 1.6
 """A seed is left from which about this many times another's effort is expected."""
-
-
-class Chain(NamedTuple):
-    """Joints of one degree of freedom each that carry the frames of some goals."""
-
-    parents: Indices  # (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1
-    places: Array  # (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation
-    turns: Array  # (n, 3) axis that it turns about, in its own frame; zero for one that slides
-    slides: Array  # (n, 3) axis that it slides along; zero for one that turns
-    support: NDArray[np.int8]  # (n + 1, n) 1 where a column moves a joint
-    lower: Array  # (n,) least values of the joints
-    upper: Array  # (n,) greatest values
-
-
-class Goals(NamedTuple):
-    """Goals as in `terms.entries.RESIDUAL` and `terms.entries.AXIS`, with the numbers of the chain's joints."""
-
-    tables: Array  # (e, 36) floats of places and rotations
-    entries: Integers  # (e, 6) their integers
-    axis_tables: Array  # (a, 24) floats of axes
-    axis_entries: Integers  # (a, 3) their integers
-
-
-class Room(NamedTuple):
-    """Room for a descent."""
-
-    joints: Array  # (n + 1, 4, 3) placements of the joints; the first is the world's
-    columns: Array  # (n, 6) columns of the joint Jacobian
-    wrench: Array  # (m, 6) of the errors
-    value: Array  # (m,) the errors
-    jacobian: Array  # (m, n) their derivatives
-    free: Mask  # (n,) whether a joint moves in the present step
 
 
 @compiled(inner=True, error_model="numpy")
@@ -75,9 +47,14 @@ def reach(
         How many seeds were taken.
     """
     tolerance, most, enough = asked[0], int(asked[2]), asked[3]
-    weighed, best = False, np.inf
+    weighed, best, equal = False, np.inf, 0
     for weight in nearest[1]:
         weighed = weighed or weight > 0.0
+    for one_sided in goals.one_sided:
+        equal += 0 if one_sided else 1
+    for r in range(len(room.value)):
+        room.active[r] = True
+    others = len(goals.plane_entries) + len(goals.mass_entries) > 0
     for k in range(len(seeds)):
         q = seeds[k]
         if weighed and asked[4] > 0.0 and expected[k] > HARDLY * best:
@@ -87,8 +64,8 @@ def reach(
                 return k + 1
             continue
         # Programs for the least effort remove the remaining errors too, where they have a way to go.
-        done = 1e-3 * tolerance if weighed and len(q) > len(room.value) else 0.0
-        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most)
+        done = 1e-3 * tolerance if weighed and len(q) > equal else 0.0
+        steps = _descend(chain, goals, room, q, (tolerance, done), asked[1], most, others)
         left = np.sqrt(dot(room.value, room.value))
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps
         if not left <= tolerance:
@@ -96,7 +73,7 @@ def reach(
         _unwind(chain, q, nearest[0])
         if weighed:
             before = q.copy()
-            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf
+            asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf, others
             found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
             if found[k, 2] == 0.0:
                 copy(before, q)
@@ -113,7 +90,7 @@ def reach(
 
 @compiled(inner=True, error_model="numpy")
 def _descend(
-    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int
+    chain: Chain, goals: Goals, room: Room, q: Array, near: tuple[float, float], damping: float, most: int, others: bool
 ) -> int:  # fmt: skip
     """Steps of damped least squares until the goals' errors, `room.value`, are small as they get, or hardly fall.
 
@@ -126,6 +103,11 @@ def _descend(
     before, marked, (tolerance, done) = np.inf, np.inf, near
     for count in range(most + 1):
         evaluate(chain, goals, room, q)
+        if others:
+            evaluate_others(chain, goals, room)
+            _activate(goals, room)
+            for r in range(rows):
+                room.value[r] = room.value[r] if room.active[r] else 0.0
         left = np.sqrt(dot(room.value, room.value))
         if count == most or left <= done or (left <= tolerance and count and left > 0.5 * before):
             return count
@@ -136,6 +118,8 @@ def _descend(
                 return count
             marked = left
         rows_of(chain, goals, room)
+        if others:
+            rows_of_others(chain, goals, room)
         for i in range(size):
             room.free[i], dq[i] = True, 0.0
         held = True
@@ -147,7 +131,7 @@ def _descend(
                     if not room.free[i]:
                         right[r] -= room.jacobian[r, i] * dq[i]
                 damped += 0.5 * right[r] * right[r]
-            _fill_normal(room, ones, damped, scaled, system)
+            _fill_normal(room, ones, damped, scaled, system, others)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -162,7 +146,7 @@ def _descend(
 
 @compiled(inner=True, error_model="numpy")
 def _least_effort(
-    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, asked: tuple[float, float], found: Array
+    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, asked: tuple[float, float, bool], found: Array
 ) -> int:  # fmt: skip
     """Step to the least effort among postures that meet the goals, by programs whose constraints are linear.
 
@@ -171,7 +155,7 @@ def _least_effort(
     is J. Barzilai and J. M. Borwein's step length ("Two-Point Step Size Gradient Methods", IMA Journal of Numerical
     Analysis 8, 1988), since the curvature of the constraints is left out of the programs. Sets ``found[0]`` to the
     norm of the errors, and ``found[2]`` to 1 where it converged, to -1 where the effort will clearly be more than
-    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance.
+    ``asked[1]``, else to 0. ``asked[0]`` is the tolerance, ``asked[2]`` whether there are planes or a centre of mass.
 
     Returns:
         Steps taken.
@@ -179,20 +163,31 @@ def _least_effort(
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
     moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
-    released, scaled, (tolerance, most) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
+    released, scaled, (tolerance, most, others) = np.empty(size, dtype=np.bool_), np.empty((rows, size)), asked
+    let_go = np.empty(rows, dtype=np.bool_)  # rows that were
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
+        if others:
+            evaluate_others(chain, goals, room)
+            _activate(goals, room)
+        left = 0.0
+        for r in range(rows):
+            left += room.value[r] ** 2 if room.active[r] else 0.0
+            let_go[r] = False
+        left = np.sqrt(left)
         rows_of(chain, goals, room)
+        if others:
+            rows_of_others(chain, goals, room)
         for i in range(size):
             room.free[i], released[i], shift[i] = True, False, nearest[0, i] - q[i]
         changed = True
-        while changed:  # every round holds a joint or releases one for the first time
+        while changed:  # every round holds a joint or a row, or releases one for the first time
             for r in range(rows):
-                right[r] = room.value[r]
-                for i in range(size):
+                right[r] = room.value[r] if room.active[r] else 0.0
+                for i in range(size if room.active[r] else 0):
                     right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
-            _fill_normal(room, nearest[1], 1e-12, scaled, system)
+            _fill_normal(room, nearest[1], 1e-12, scaled, system, others)
             if not solve(system, right):
                 return count
             for i in range(size):
@@ -202,15 +197,21 @@ def _least_effort(
                         dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
             changed = _hold_first(chain, room.free, q, dq)
             if not changed:
+                row = _next_row(goals, room, dq, right) if others else -1
+                changed = row >= 0 and not (room.active[row] and let_go[row])
+                if changed:
+                    let_go[row] = let_go[row] or room.active[row]
+                    room.active[row] = not room.active[row]
+                    continue
                 wrong = _held_wrongly(chain, room, q, dq, nearest, right)
                 changed = wrong >= 0 and not released[wrong]
                 if changed:
                     room.free[wrong] = released[wrong] = True
+                wrong = max(wrong, row)
         longest, effort = 0.0, 0.0
         for i in range(size):
             longest = max(longest, abs(dq[i]))
             effort += nearest[1, i] * (q[i] + dq[i] - nearest[0, i]) ** 2
-        left = np.sqrt(dot(room.value, room.value))
         if longest < NEAR and effort > most:
             found[2] = -1.0
             return count
@@ -230,8 +231,30 @@ def _least_effort(
     return 40
 
 
+@compiled(inner=True)
+def _activate(goals: Goals, room: Room) -> None:
+    """Count the rows of equalities, and those of inequalities that are not met."""
+    for r in range(len(room.value)):
+        room.active[r] = not goals.one_sided[r] or room.value[r] < 0.0
+
+
+@compiled(inner=True)
+def _next_row(goals: Goals, room: Room, dq: Array, multipliers: Array) -> int:
+    """The inequality that a step violates most; else the one that the effort pulls most away from; -1 where none is."""
+    worst, most, pulled, pull = -1, -1e-9, -1, 1e-6
+    for r in range(len(room.value)):
+        if room.active[r]:
+            if goals.one_sided[r] and multipliers[r] > pull:
+                pulled, pull = r, multipliers[r]
+            continue
+        value = room.value[r] + dot(room.jacobian[r], dq)
+        if value < most:
+            worst, most = r, value
+    return worst if worst >= 0 else pulled
+
+
 @compiled(inner=True, error_model="numpy")
-def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array) -> None:
+def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, system: Array, others: bool) -> None:
     """The lower triangle of ``J W^-1 J' + damping`` (m, m) over the free joints, for weights (n,); `scaled` is room."""
     for r in range(len(system)):
         for i in range(len(weights)):
@@ -239,6 +262,10 @@ def _fill_normal(room: Room, weights: Array, damping: float, scaled: Array, syst
     gram(scaled, room.jacobian, len(system), system)
     for r in range(len(system)):
         system[r, r] += damping
+    for r in range(len(system) if others else 0):
+        if not room.active[r]:
+            for s in range(len(system)):
+                system[max(r, s), min(r, s)] = 1.0 if r == s else 0.0
 
 
 @compiled(inner=True)
@@ -300,59 +327,6 @@ def _unwind(chain: Chain, q: Array, nearest: Array) -> None:
                 q[i] += FULL
 
 
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
-def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
-    """Placements of the joints, columns of their Jacobian in the world, and the errors of the goals with wrenches."""
-    joints, columns, places, turns, slides = room.joints, room.columns, chain.places, chain.turns, chain.slides
-    for k in range(len(q)):
-        b, c = chain.parents[k], k + 1
-        for i in range(3):
-            d, e, f = joints[b, 0, i], joints[b, 1, i], joints[b, 2, i]
-            for j in range(4):
-                joints[c, j, i] = d * places[k, j, 0] + e * places[k, j, 1] + f * places[k, j, 2]
-            joints[c, 3, i] += joints[b, 3, i]
-        x, y, z = turns[k, 0], turns[k, 1], turns[k, 2]
-        if x == 0.0 and y == 0.0 and z == 0.0:
-            for i in range(3):
-                slide = joints[c, 0, i] * slides[k, 0] + joints[c, 1, i] * slides[k, 1] + joints[c, 2, i] * slides[k, 2]
-                columns[k, i], columns[k, 3 + i] = slide, 0.0
-                joints[c, 3, i] += q[k] * slide
-            continue
-        cosine, sine = np.cos(q[k]), np.sin(q[k])
-        for i in range(3):  # Rodrigues, in the joint's frame: the rows of R (c 1 + (1 - c) u u' + s [u])
-            d, e, f = joints[c, 0, i], joints[c, 1, i], joints[c, 2, i]
-            axis = d * x + e * y + f * z
-            along = (1.0 - cosine) * axis
-            joints[c, 0, i] = cosine * d + sine * (e * z - f * y) + along * x
-            joints[c, 1, i] = cosine * e + sine * (f * x - d * z) + along * y
-            joints[c, 2, i] = cosine * f + sine * (d * y - e * x) + along * z
-            columns[k, 3 + i] = axis
-        x, y, z = columns[k, 3], columns[k, 4], columns[k, 5]
-        columns[k, 0] = joints[c, 3, 1] * z - joints[c, 3, 2] * y
-        columns[k, 1] = joints[c, 3, 2] * x - joints[c, 3, 0] * z
-        columns[k, 2] = joints[c, 3, 0] * y - joints[c, 3, 1] * x
-    residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
-    if len(goals.axis_entries) > 0:  # their arrays take time in every descent
-        for row in goals.axis_entries[:, 0]:
-            room.wrench[row : row + 2] = 0.0  # of a direction no force is written
-        axis_errors(goals.axis_tables, goals.axis_entries, joints, room.wrench, room.value)
-
-
-@compiled(error_model="numpy")
-def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
-    """Rows of the goals: the rates at which their wrenches work on the motion of a joint relative to another."""
-    entries, axes, support = goals.entries, goals.axis_entries, chain.support
-    for e in range(len(entries)):
-        for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
-            for k in range(len(room.columns)):
-                moved = support[entries[e, 1], k] - support[entries[e, 2], k]
-                room.jacobian[r, k] = moved * dot(room.wrench[r], room.columns[k]) if moved != 0 else 0.0
-    for e in range(len(axes)):
-        for r in range(axes[e, 0], axes[e, 0] + 2):
-            for k in range(len(room.columns)):
-                room.jacobian[r, k] = support[axes[e, 1], k] * dot(room.wrench[r], room.columns[k])
-
-
 @compiled(error_model="numpy", nogil=True)
 def reach_all(
     bodies: tuple[Chain, Arm, Room], asked: Array, goals: tuple[Array, Goals], samples: tuple[int, int],
@@ -377,7 +351,10 @@ def reach_all(
     order, seeds = np.empty(samples[1] * BRANCHES, dtype=np.intp), np.empty((every, size))
     met, expected = np.empty((every, 4)), np.zeros(every)
     for p in range(len(tables)):
-        one = Goals(tables[p], alike.entries, alike.axis_tables, alike.axis_entries)
+        one = Goals(
+            tables[p], alike.entries, alike.axis_tables, alike.axis_entries, alike.plane_tables, alike.plane_entries,
+            alike.mass_tables, alike.mass_entries, alike.bodies, alike.one_sided,
+        )  # fmt: skip
         if not len(arm.joints):
             given = ends[p, : counts[p]]
             counts[p] = reach(chain, one, room, given, nearest[p], asked, expected, found[p])

@@ -15,7 +15,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.compiled import with_loops
-from wholebody.methods.qp.chain_kernel import Chain
+from wholebody.methods.qp.chain_goals_kernel import Chain
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, PARALLEL, SLACK, THREE_PARALLEL, Arm
 
 ALIKE = 1e-4  # rad: axes that differ by less count as parallel; m: lines that pass each other nearer count as crossing

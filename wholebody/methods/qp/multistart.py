@@ -58,6 +58,7 @@ class QPMultistart(Search):
         """The best of attempts, from `begin` first, and a descent from `other`; out of reach, the closest to `near`."""
         # `least`: measures where the goals are known to be met, if through things; 0 where nothing is known
         self.out_of_reach, self._through_measure = bool(near), least
+        self.contradictions = contradictions(self.problem, self.lineariser.workspace) if near else ()
         if not near:
             self.search(self._attempts(begin))
             other = self._start if self._doubtful and self.how == "from a squat" else other
@@ -371,8 +372,8 @@ class QPMultistart(Search):
 
     def _proven(self) -> bool:
         """Whether the best posture is known to be the closest to the goals."""
-        near = self.best.violation.left <= NEAREST * self._least
-        return near and bool(self._least) and held(self.best, self.settings.tolerance)
+        known = self._least > 0.0 and self.best.violation.left <= NEAREST * self._least
+        return known and held(self.best, self.settings.tolerance)
 
     def _seems_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
@@ -393,8 +394,7 @@ class QPMultistart(Search):
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one."""
         nearest = self._ran(self._closest(), self.best.q)
-        if not nearest.converged:
-            self.accept(nearest)
-            nearest = self._descend(self.best.q, note="nearest", measures=False)
         self.accept(nearest)
+        if not nearest.converged:
+            self.accept(nearest := self._descend(self.best.q, note="nearest", measures=False))
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)

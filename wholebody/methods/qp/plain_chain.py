@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from copy import copy
 from functools import lru_cache
 from typing import Any
@@ -15,16 +15,18 @@ from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.description import Limits
 from wholebody.methods.qp import branch_kernel, chain_kernel
-from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
+from wholebody.methods.qp.chain_goals_kernel import Chain, Goals, Room
 from wholebody.methods.qp.closed_form import NEARLY, Branches, closed_form
 from wholebody.methods.qp.closed_form import compiled_kernel as closed_form_kernel
 from wholebody.methods.qp.closed_form_kernel import BRANCHES, CROSSING, SLACK, Arm
 from wholebody.methods.qp.settings import SEEDS
-from wholebody.terms.entries import AXIS, RESIDUAL, Entry, Integers
+from wholebody.terms.entries import AXIS, MASS_CENTER, PLANE, RESIDUAL, Entry
 
 LOOSE = 1e-2  # a share of lengths, and rad
 NEARBY = 1e-3  # m, rad
 FIRST = 16  # ends of a closed form's branches that the compiled loop has room for
+WIDTHS = {RESIDUAL: (36, 6), AXIS: (24, 3), PLANE: (7, 3), MASS_CENTER: (4, 1)}  # floats, integers
+_NO_FLOATS = {width: np.zeros((0, width)) for width, _ in WIDTHS.values()}
 _NO_ARM = Arm(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=np.intp), -1, CROSSING, 0, np.zeros((4, 3)), SLACK)
 _ONE = np.zeros(1)
 
@@ -35,6 +37,8 @@ class PlainChain:
     Attributes:
         chain: the arrays.
         idx_v: (n,) place of each joint in the tangent.
+        joints: (n + 1,) their numbers in the model, the world first.
+        carriers: (njoints,) the joint of the chain, or the world, that carries each of the model.
         arm: the arm that they are, None where it has no closed form.
         guide: the same, or an arm that they nearly are.
         held: the joint that the closed form of the guide holds; -1 for none.
@@ -49,7 +53,14 @@ class PlainChain:
         subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
         placements = [model.jointPlacements[joint] for joint in joints]
         self._number = number
-        self._integers: dict[tuple[tuple[int, ...], ...], tuple[Integers, Integers]] = {}
+        self._known: dict[Hashable, tuple[Any, ...]] = {}  # see `goals`
+        inertias = [model.inertias[joint] for joint in joints]
+        self.joints, self._bodies = np.array([0, *joints]), np.zeros((len(joints) + 1, 4))
+        above = [
+            [number[one] for one in list(model.supports[joint]) if one in number] for joint in range(model.njoints)
+        ]
+        self.carriers = np.array([every[-1] for every in above])
+        self._bodies[1:] = [[inertia.mass, *(inertia.mass * inertia.lever)] for inertia in inertias]
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
         self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
         first, last = int(self._idx_q[0]), int(self._idx_q[-1]) + 1
@@ -105,23 +116,39 @@ class PlainChain:
             q[..., self._idx_q[self._round]], q[..., self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
         return q
 
-    def goals(self, entries: list[Entry]) -> Goals:
-        """Entries of goals with the numbers of these joints."""
-        kinds = tuple([(entry.table, *entry.integers) for entry in entries])
-        known = self._integers.get(kinds)
-        if known is None:
-            placed, pointed, row = list[tuple[int, ...]](), list[tuple[int, ...]](), 0
-            for entry in entries:
-                joint, second, *kind = entry.integers
-                if entry.table == RESIDUAL:
-                    placed.append((row, self._number[joint], self._number[second], *kind))
-                else:
-                    pointed.append((row, self._number[joint], second))
-                row += entry.rows
-            known = np.array(placed, dtype=np.int64).reshape(-1, 6), np.array(pointed, dtype=np.int64).reshape(-1, 3)
-            self._integers[kinds] = known
-        places, axes = ([entry.floats for entry in entries if entry.table == table] for table in (RESIDUAL, AXIS))
-        return Goals(np.array(places).reshape(-1, 36), known[0], np.array(axes).reshape(-1, 24), known[1])
+    def goals(self, entries: Sequence[Entry], sides: Sequence[Entry] = ()) -> Goals:
+        """Entries of goals, and of inequalities, with the numbers of these joints."""
+        every = [*entries, *sides]
+        kinds = len(sides), tuple([(entry.table, *entry.integers) for entry in every])
+        if kinds not in self._known:
+            self._known[kinds] = self._read(entries, sides)
+        known, floats = self._known[kinds], list[Array]()
+        for table, (width, _) in WIDTHS.items():
+            some = [entry.floats for entry in every if entry.table == table]
+            floats.append(np.array(some) if some else _NO_FLOATS[width])
+        return Goals(floats[0], known[0], floats[1], known[1], floats[2], known[2], floats[3], *known[3:])
+
+    def _read(self, entries: Sequence[Entry], sides: Sequence[Entry]) -> tuple[Any, ...]:
+        """What `Goals` has of entries but for floats."""
+        written: dict[int, list[tuple[int, ...]]] = {table: [] for table in WIDTHS}
+        row, bodies = 0, self._bodies
+        for entry in (*entries, *sides):
+            joint, *kind = entry.integers
+            if entry.table == RESIDUAL:
+                written[RESIDUAL].append((row, self._number[joint], self._number[kind[0]], *kind[1:]))
+            elif entry.table == MASS_CENTER:
+                counts = (self.joints >= joint) & (self.joints < kind[0])
+                bodies = self._bodies * counts[:, None] / (self._bodies[:, 0] @ counts)
+                written[MASS_CENTER].append((row,))
+            else:
+                written[entry.table].append((row, self._number[joint], *kind, 0)[:3])  # a plane is of the world
+            row += entry.rows
+        integers = [np.array(written[t], dtype=np.int64).reshape(-1, width) for t, (_, width) in WIDTHS.items()]
+        return *integers, bodies, np.arange(row) >= row - sum(entry.rows for entry in sides)
+
+    def carries(self, entry: Entry, model: pin.Model) -> bool:
+        """Whether all joints that an entry depends on are of this chain."""
+        return all(joint in self._number for joint in joints_of(entry, model))
 
     def room(self, rows: int) -> Room:
         """Room for descents with so many rows: the same for the same number."""
@@ -131,7 +158,7 @@ class PlainChain:
             joints[0, :3] = np.eye(3)
             self._rooms[rows] = Room(
                 joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
-                np.empty(size, dtype=np.bool_),
+                np.empty(size, dtype=np.bool_), np.empty(rows, dtype=np.bool_), np.zeros((size + 1, 4)),
             )  # fmt: skip
         return self._rooms[rows]
 
@@ -189,8 +216,12 @@ class PlainChain:
 
     def is_guided(self, goals: Goals) -> bool:
         """Whether the goals are one placement of a frame that the guide has postures of."""
-        alone = self.guide is not None and not len(goals.axis_entries)
+        alone = self.guide is not None and len(goals.one_sided) - np.count_nonzero(goals.one_sided) == 6
         return alone and goals.entries[:, 2:].tolist() == [[0, 1, 1, 0]]
+
+    def is_finite(self, goals: Goals) -> bool:
+        """Whether the closed form has all postures of the goals, and these are isolated."""
+        return self.arm is not None and self.held < 0 and self.is_guided(goals)
 
     def descents(
         self, tables: Array, goals: Goals, nearest: Array, asked: Array, ends: Array, seeds: int = 0
@@ -239,13 +270,13 @@ class Chains:
 
     def carrying(self, entries: Sequence[Entry]) -> PlainChain | None:
         """The chain that carries the frames of goals."""
-        return self.of(frozenset(joint for entry in entries for joint in _joints_of(entry)))
+        return self.of(frozenset(joint for entry in entries for joint in joints_of(entry, self._model)))
 
     def apart(self, entries: Sequence[Entry]) -> list[tuple[PlainChain, list[Entry]]]:
         """The chains that carry the frames of goals and have no joint in common, each with its entries."""
         groups = list[tuple[set[int], list[Entry]]]()
         for entry in entries:
-            joints = {above for joint in _joints_of(entry) for above in self._model.supports[joint]} - {0}
+            joints = {above for joint in joints_of(entry, self._model) for above in self._model.supports[joint]} - {0}
             own, others = [entry], list[tuple[set[int], list[Entry]]]()
             for known, theirs in groups:
                 if known & joints:
@@ -257,19 +288,16 @@ class Chains:
         return [(chain, own) for chain, own in found if chain is not None]
 
 
-def _joints_of(entry: Entry) -> tuple[int, ...]:
-    """The joints of a frame, and of the frame that its goal is relative to."""
+def joints_of(entry: Entry, model: pin.Model) -> tuple[int, ...]:
+    """The joints of a frame, and of the frame that its goal is relative to, or those that carry a mass that counts."""
+    if entry.table == MASS_CENTER:
+        return tuple(joint for joint in range(*entry.integers) if model.inertias[joint].mass > 0.0)
     return entry.integers[: 2 if entry.table == RESIDUAL else 1]
 
 
 def rows_of(goals: Goals) -> int:
     """How many rows the goals have."""
-    return _rows(goals.entries.tobytes()) + 2 * len(goals.axis_entries)
-
-
-@lru_cache(maxsize=256)
-def _rows(entries: bytes) -> int:
-    return 3 * int(np.frombuffer(entries, dtype=np.int64).reshape(-1, 6)[:, 3:5].sum())
+    return len(goals.one_sided)
 
 
 @lru_cache(maxsize=64)
@@ -293,11 +321,17 @@ def compiled_kernel(_: Any) -> None:
     closed_form_kernel()
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
     room = Room(
-        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
-    )
+        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_),
+        np.zeros(0, np.bool_), np.zeros((2, 4)),
+    )  # fmt: skip
     chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
-    bodies, entries, near = (chain, _NO_ARM, room), np.zeros((0, 6), dtype=np.int64), np.zeros((0, 2, 1))
-    goals, efforts = Goals(np.zeros((1, 36)), entries, np.zeros((0, 24)), entries[:, :3].copy()), np.empty((0, 2))
+    bodies, near, efforts = (chain, _NO_ARM, room), np.zeros((0, 2, 1)), np.empty((0, 2))
+    tables: Any = [
+        np.zeros((0, width), kind)
+        for widths in WIDTHS.values()
+        for width, kind in zip(widths, (float, np.int64), strict=True)
+    ]
+    goals = Goals(*(*tables, np.zeros((2, 4)), np.zeros(0, np.bool_)))
     chain_kernel.reach_all(
         bodies, np.zeros(5), (np.zeros((0, 0, 36)), goals), (1, 1), near, np.zeros((0, 1, 1)), np.zeros((0, 1, 4)),
         np.zeros(0, dtype=np.intp),

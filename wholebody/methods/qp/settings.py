@@ -97,6 +97,7 @@ class SeedNumbers(NamedTuple):
     together: int = 10  # seeds of a batch
     batches: int = 25  # most. More: fewer problems are left to the slower search, which then begins later.
     weighed: int = 2  # batches led to the least effort where joints are left free. More: less effort, more in vain.
+    sparse: int = 3  # most batches for as many ends as are compared. More: less effort where few seeds lead to goals.
     compared: int = 5  # ends of which the one of least effort is taken. More: less effort, more time.
     samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
     finer: int = 96  # the same where no posture of these is within limits. More: random seeds are tried less often.
