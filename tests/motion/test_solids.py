@@ -7,8 +7,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wholebody as wb
 from wholebody.motion import solids
 from wholebody.motion.solids import Solid, least_distance
+from wholebody.motion.thing_contacts import said_of_many
 
 POINT = coal.Sphere(1e-6)
 
@@ -69,3 +71,16 @@ def test_what_a_vertical_line_meets_is_below() -> None:
     assert numbers((2.2, 0.1, 1.0), 0.4) == [0]
     assert numbers((3.0, 0.0, 0.4), 2.0) == [0]  # below the highest step
     assert numbers((9.0, 0.0, 1.0), 2.0) == [0]
+
+
+def test_a_scan_of_a_thousand_triangles_is_told() -> None:
+    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(0.0, 1.0, 24)]))
+    corners = np.stack([x, y, 0.3 + 0.1 * np.sin(7.0 * x) * np.cos(5.0 * y)], axis=1)
+    first = (np.arange(23)[:, None] * 24 + np.arange(23)).ravel()
+    faces = np.vstack(
+        [np.stack([first, first + 1, first + 25], axis=1), np.stack([first, first + 25, first + 24], axis=1)]
+    )
+    scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 0.1, 0.1)), name="box")
+    assert said_of_many(scene) == ""
+    scene.add(wb.Mesh((corners, faces)), name="scan", at=(3.0, 0.0, 0.0))
+    assert said_of_many(scene).startswith("scan is 1058 pieces, which may take seconds a frame")

@@ -39,6 +39,9 @@ SHARES = (1.0, 0.5, 0.0)
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
 
 
+MANY = 1000  # pieces of a thing from which a frame takes seconds
+
+
 class ThingContact(NamedTuple):
     """A part of the body at one place of a thing."""
 
@@ -58,6 +61,17 @@ def still_things(scene: Scene) -> list[str]:
     """Things of a scene that stand in the world, without floors."""
     standing = (name for name, each in scene.objects.items() if each.segment is None)
     return [name for name in standing if not isinstance(scene.objects[name].shape, HalfSpace)]
+
+
+def said_of_many(scene: Scene) -> str:
+    """What is known of things of very many pieces; empty without one."""
+    counts = {name: len(scene.built.pieces_of[name]) for name in still_things(scene)}
+    return "; ".join(
+        f"{name} is {count} pieces, which may take seconds a frame: a mesh that encloses nothing, such as a scan, is a "
+        "piece a triangle; close it, or give hulls of its parts"
+        for name, count in counts.items()
+        if count > MANY
+    )
 
 
 class Things:
