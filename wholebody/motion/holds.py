@@ -77,6 +77,8 @@ class Holds:
         ]
         feet = sorted({point.foot for point in points if point.foot})
         self._soles = [[k for k, point in enumerate(points) if point.foot == foot] for foot in feet]
+        # of feet that bend at their toes, which may be on their tips
+        self._tips = {k for own in self._soles for k in own if points[k].joint != points[own[0]].joint}
         self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
         self._places: dict[tuple[int, int], Array] = {}
         self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
@@ -232,9 +234,8 @@ class Holds:
             elif self.points[number].lifts:
                 weights[number, 2] = 0.0
             if self.points[number].foot:
-                # on the tips of its toes a foot stays down, however steep its sole
-                tip = on and self.points[number].edge and self.points[number].role.endswith("toe")
-                least = min(weights[number, 2], LAID) if tip else 0.0
+                # however steep their sole is, tips of toes that rest stay down
+                least = min(weights[number, 2], LAID) if on and number in self._tips else 0.0
                 weights[number, 2] = max(weights[number, 2] * down[number], least)  # contact says how high
             elif not self.points[number].thing:
                 weights[number, 2] = min(weights[number, 2], LAID) if all(map(self._bears, around)) else 0.0
