@@ -21,7 +21,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import placement
 from wholebody.motion.clip import ROOT_SIZE, Clip, check_figure
-from wholebody.motion.files import FBX, SKELETONS, bvh, columns, gltf_reading, read_frames
+from wholebody.motion.files import OTHERS, SKELETONS, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.roles import column_names
@@ -58,7 +58,7 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
     motion = _skeleton(path, unit, up)
     if motion is None:
         other = "is no skeleton; give a BVH or glTF file, or an archive of AMASS (.npz)"
-        raise FileFormatError(f"{one_line(path.name)}: {FBX if path.suffix.lower() == '.fbx' else other}")
+        raise FileFormatError(f"{one_line(path.name)}: {OTHERS.get(path.suffix.lower(), other)}")
     _say(motion, path)
     if unit is not None and not is_sized(motion.parents, motion.offsets):
         own = longest_way(motion.parents, motion.offsets)

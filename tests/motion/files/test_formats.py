@@ -515,11 +515,21 @@ def test_an_unknown_ending_is_answered_with_all_that_can_be_read(human: Figure, 
         wb.read_clip(tmp_path / "walk.mocap", human)
 
 
-def test_fbx_is_answered_with_what_turns_it_into_what_is_read(human: Figure, tmp_path: Path) -> None:
-    (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary  ")
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("walk.fbx", "FBX is not read; Blender .*Export > glTF"),
+        ("Walk.C3D", "holds places of markers and no skeleton; .* export BVH$"),
+        ("walk.trc", "holds places of markers and no skeleton"),
+    ],
+)
+def test_what_is_not_read_is_answered_with_what_turns_it_into_what_is(
+    name: str, said: str, human: Figure, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_bytes(b"Kaydara FBX Binary  ")
     for read in (wb.motion.read_skeleton, partial(wb.read_clip, figure=human)):
-        with pytest.raises(wb.FileFormatError, match=r"walk\.fbx: FBX is not read; Blender .*Export > glTF"):
-            read(tmp_path / "walk.fbx")
+        with pytest.raises(wb.FileFormatError, match=rf"^{name}: {said}"):
+            read(tmp_path / name)
 
 
 @pytest.mark.parametrize("dtype", ["int8", "float64"])
