@@ -84,6 +84,20 @@ def test_a_sole_comes_to_be_held_at_its_height_while_it_turns_to_the_ground(huma
     assert np.diff(pulls).max() < 0.1 * pulls[-1]
 
 
+def test_a_hand_that_rests_above_the_ground_keeps_its_height(human: wb.Figure) -> None:
+    """10 cm above it, as on what nobody told of, a hand that would sway up and down is held at its mean."""
+    motion, _ = walker(flat, 30 * DT)
+    rest = Foothold("left_wrist", 0, 30, np.array([0.0, 0.0, 0.1]), 0.0)
+    ground = Ground((rest,), {"left_wrist": np.ones(30, dtype=bool)}, {"left_toe": 0.0}, (0.0,), 0.0, False, DT)
+    points = held_points(human, matched(motion, human, None), ground)
+    paths = {k: np.array([[0.3, 0.2, 0.1 + 0.02 * np.sin(k)]]) for k in range(30)}
+    held = Holds(points, ground, 1.0, DT, None)
+    for k in range(1, 29):
+        goals, weights = held.goals(k, paths, np.zeros(3), again=True)
+        assert goals[0] == pytest.approx([0.3, 0.2, np.mean([paths[j][0, 2] for j in range(6)])])
+        assert weights[0, 2] == LAID
+
+
 def test_a_foot_that_trembles_rests_and_one_that_hangs_does_not() -> None:
     motion, stands = walker(flat, 2.0)
     at = np.array(motion.positions)

@@ -31,7 +31,7 @@ EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyo
 BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 STEEP = 0.4, 0.8  # cosines from up to the normal of a sole on its toes: held at no height yet, and fully held
-LAID = 4.0  # of the height of hands, knees and tips of toes that bear on the ground: bones, and contacts, say more
+LAID = 4.0  # of the height of hands, knees and tips of toes that rest: bones, and contacts, say more
 PALM = 0.04  # m: how high above toes that stand a hand, or wrist, is recorded that bears on the ground
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -238,7 +238,7 @@ class Holds:
                 least = min(weights[number, 2], LAID) if on and number in self._tips else 0.0
                 weights[number, 2] = max(weights[number, 2] * down[number], least)  # contact says how high
             elif not self.points[number].thing:
-                weights[number, 2] = min(weights[number, 2], LAID) if all(map(self._bears, around)) else 0.0
+                weights[number, 2] = min(weights[number, 2], LAID)
         return goals, weights
 
     def _bears(self, stand: Foothold | ThingContact) -> bool:
