@@ -151,6 +151,41 @@ def test_knees_rest_on_the_ground_though_hands_are_recorded_below_it(human: wb.F
         assert knee[:, 2].max() < 0.16  # 0.23 m where the body goes up with the hands; 0.1 m is on the floor
 
 
+def test_toes_that_are_tucked_under_stay_on_the_ground(human: wb.Figure) -> None:
+    """Somebody goes down on a knee: the sole turns from level to upright over the toes, which rest all the time."""
+    motion, _ = walker(flat, 2.0)
+    at, down = np.array(motion.positions), np.clip(np.arange(len(motion)) * DT / 0.8, 0.0, 1.0)
+    smooth = down * down * (3.0 - 2.0 * down)
+    at[:, :, 1] = motion.positions[0, :, 1]
+    foot = 0.26  # m from ankle to toe, longer than a person's, so that followed alone the toes end 10 cm up
+    toe, left = np.array([-0.4 + foot, -0.1, 0.03]), np.array([0.4, 0.1, ANKLE])
+    for k, share in enumerate(smooth):
+        at[k, 0] = [0.0, 0.0, 0.8 - 0.25 * share]
+        angle = 0.2 + share * (0.5 * np.pi - 0.2)
+        ankle = toe + foot * np.array([-np.cos(angle), 0.0, np.sin(angle)])
+        for first, end, far in ((1, left, left + [TOE, 0.0, 0.03 - ANKLE]), (5, ankle, toe)):
+            hip = at[k, 0] + motion.offsets[first]
+            at[k, first : first + 4] = [hip, knee(hip, end), end, far]
+        for joint in range(9, len(motion.names)):
+            at[k, joint] = at[k, motion.parents[joint]] + motion.offsets[joint]
+    motion = dataclasses.replace(motion, positions=at)
+    assert wb.motion.ground(motion).rests["right_toe"].mean() > 0.9
+    clip = wb.retarget(motion, human)
+    toes = [height_of(clip, k, "right_toes") for k in range(0, len(clip), 5)]
+    assert max(toes) < 0.02  # m; 0.075 where nothing draws them down
+
+
+def height_of(clip: wb.Clip, frame: int, segment: str) -> float:
+    """Height of the lowest point of a segment, metres."""
+    floor = wb.Scene(clip.figure).add(wb.HalfSpace(), name="floor")
+    near = floor.contacts(clip.q[frame], within=0.5)
+    return min(
+        float(gap)
+        for gap, pair in zip(near.distance, near.pair, strict=True)
+        if {floor.piece_owner[piece] for piece in pair} == {segment, "floor"}
+    )
+
+
 def test_feet_of_who_kneels_do_not_rest() -> None:
     motion, _ = walker(flat, 1.0)
     at = np.repeat(motion.positions[:1], len(motion), axis=0)

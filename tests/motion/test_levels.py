@@ -15,7 +15,7 @@ from tests.motion.test_retargeting import angles, person, places
 from wholebody.motion import retargeting
 from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.held_points import held_points
-from wholebody.motion.holds import Holds
+from wholebody.motion.holds import LAID, Holds
 from wholebody.motion.roles import matched
 from wholebody.motion.standing_ground import Foothold, Ground
 from wholebody.motion.thing_contacts import own_rests
@@ -64,7 +64,10 @@ def test_a_foot_that_turns_high_in_the_air_does_not_rest(seconds: float, rests: 
 
 
 def test_a_sole_comes_to_be_held_at_its_height_while_it_turns_to_the_ground(human: wb.Figure) -> None:
-    """A foot that turns by a degree a frame, from toes down to flat: no frame pulls it down much more."""
+    """A foot that turns by a degree a frame, from toes down to flat: no frame pulls it down much more.
+
+    On the tips of its toes it is drawn down as hands are that bear.
+    """
     motion, _ = walker(flat, 91 * DT)
     roles = matched(motion, human, None)
     every, rest = np.ones(91, dtype=bool), Foothold("left_toe", 0, 91, np.zeros(3), 0.0)
@@ -77,8 +80,22 @@ def test_a_sole_comes_to_be_held_at_its_height_while_it_turns_to_the_ground(huma
         turn = pin.SE3(pin.utils.rotate("y", np.radians(90.0 - frame)), np.zeros(3)) * data.oMi[foot].inverse()
         paths[frame] = np.array([turn.act(data.oMi[point.joint].act(point.place)) for point in points])
     pulls = np.array([held.goals(frame, paths, np.zeros(3), again=True)[1][:, 2].max() for frame in range(91)])
-    assert pulls[0] == 0.0
+    assert 0.0 < pulls[0] == LAID < 0.01 * pulls[-1]
     assert np.diff(pulls).max() < 0.1 * pulls[-1]
+
+
+def test_a_hand_that_rests_above_the_ground_keeps_its_height(human: wb.Figure) -> None:
+    """10 cm above it, as on what nobody told of, a hand that would sway up and down is held at its mean."""
+    motion, _ = walker(flat, 30 * DT)
+    rest = Foothold("left_wrist", 0, 30, np.array([0.0, 0.0, 0.1]), 0.0)
+    ground = Ground((rest,), {"left_wrist": np.ones(30, dtype=bool)}, {"left_toe": 0.0}, (0.0,), 0.0, False, DT)
+    points = held_points(human, matched(motion, human, None), ground)
+    paths = {k: np.array([[0.3, 0.2, 0.1 + 0.02 * np.sin(k)]]) for k in range(30)}
+    held = Holds(points, ground, 1.0, DT, None)
+    for k in range(1, 29):
+        goals, weights = held.goals(k, paths, np.zeros(3), again=True)
+        assert goals[0] == pytest.approx([0.3, 0.2, np.mean([paths[j][0, 2] for j in range(6)])])
+        assert weights[0, 2] == LAID
 
 
 def test_a_foot_that_trembles_rests_and_one_that_hangs_does_not() -> None:

@@ -31,7 +31,7 @@ EDGE = 0.1  # m: by so much lower than elsewhere under a sole, a surface is beyo
 BY = 0.002  # m: a part that is nearer to a thing touches it
 NEARLY = 3e-4  # m: by which the goal of a part that touches a thing is not moved
 STEEP = 0.4, 0.8  # cosines from up to the normal of a sole on its toes: held at no height yet, and fully held
-LAID = 4.0  # of the height of hands and knees that bear on the ground: bones, and contacts, say more
+LAID = 4.0  # of the height of hands, knees and tips of toes that rest: bones, and contacts, say more
 PALM = 0.04  # m: how high above toes that stand a hand, or wrist, is recorded that bears on the ground
 OUT_OF_REACH = 0.02  # m: a part that is farther than this from its place on a thing is let go of
 OVER = 0.2  # s: in which a point goes over to where it rests
@@ -77,6 +77,8 @@ class Holds:
         ]
         feet = sorted({point.foot for point in points if point.foot})
         self._soles = [[k for k, point in enumerate(points) if point.foot == foot] for foot in feet]
+        # of feet that bend at their toes, which may be on their tips
+        self._tips = {k for own in self._soles for k in own if points[k].joint != points[own[0]].joint}
         self._ways: dict[tuple[int, int], Array] = {}  # by point and frame the place of the free fit
         self._places: dict[tuple[int, int], Array] = {}
         self._gone: set[tuple[int, int]] = set()  # points and frames in which they do not reach their things
@@ -232,9 +234,11 @@ class Holds:
             elif self.points[number].lifts:
                 weights[number, 2] = 0.0
             if self.points[number].foot:
-                weights[number, 2] *= down[number]  # contact says how high
+                # however steep their sole is, tips of toes that rest stay down
+                least = min(weights[number, 2], LAID) if on and number in self._tips else 0.0
+                weights[number, 2] = max(weights[number, 2] * down[number], least)  # contact says how high
             elif not self.points[number].thing:
-                weights[number, 2] = min(weights[number, 2], LAID) if all(map(self._bears, around)) else 0.0
+                weights[number, 2] = min(weights[number, 2], LAID)
         return goals, weights
 
     def _bears(self, stand: Foothold | ThingContact) -> bool:

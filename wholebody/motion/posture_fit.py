@@ -195,6 +195,8 @@ class Fitter:
         cones = self._state.rows(self._cone_rows[edge], *joints)
         contacts, missing = [np.zeros((0, len(lower)))], [np.zeros(0)]
         if near is not None and len(near.distance):
+            if len(near.distance) > len(lower):  # of more rows, see below, none of a farther pair is kept
+                near = near.nearer(float(np.partition(near.distance, len(lower))[len(lower)]))
             found = self._workspace.rows.rows(near, CLEARANCE)
             contacts.append(self._state.rows(found.wrench, found.second, found.first))
             missing.append(np.minimum(CLEARANCE - found.gap, PUSH))

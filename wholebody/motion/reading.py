@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import array, choice, flag, known, listed, shown, text
+from wholebody.base.checks import array, choice, flag, known, listed, shown, text, warn
 from wholebody.base.checks import path as checked_path
 from wholebody.base.checks import posture as checked_posture
 from wholebody.base.errors import FileFormatError, InputError, one_line
@@ -21,11 +21,12 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.geometry.placement import placement
 from wholebody.motion.clip import ROOT_SIZE, Clip, check_figure
-from wholebody.motion.files import FBX, SKELETONS, bvh, columns, gltf_reading, read_frames
+from wholebody.motion.files import OTHERS, SKELETONS, bvh, columns, gltf_reading, read_frames
 from wholebody.motion.files.base import Frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.roles import column_names
-from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
+from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
+from wholebody.motion.structure import is_sized, stands_along
 
 
 def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
@@ -57,8 +58,19 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
     motion = _skeleton(path, unit, up)
     if motion is None:
         other = "is no skeleton; give a BVH or glTF file, or an archive of AMASS (.npz)"
-        raise FileFormatError(f"{one_line(path.name)}: {FBX if path.suffix.lower() == '.fbx' else other}")
+        raise FileFormatError(f"{one_line(path.name)}: {OTHERS.get(path.suffix.lower(), other)}")
     _say(motion, path)
+    if unit is not None and not is_sized(motion.parents, motion.offsets):
+        own = longest_way(motion.parents, motion.offsets)
+        warn(
+            f"{one_line(path.name)}: in {unit} the person is {own:.3g} m long, along the bones from foot to head; "
+            "leave the unit out to have it recognised"
+        )
+    if up is not None and stands_along(motion, 0 if up == "y" else 1):
+        warn(
+            f"{one_line(path.name)}: with {up} up the person lies, and with {'z' if up == 'y' else 'y'} up stands on "
+            "the ground; leave the axis out to have it recognised"
+        )
     return motion
 
 

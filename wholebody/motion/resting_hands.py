@@ -15,7 +15,8 @@ from wholebody.base.fields import Checked, Names
 from wholebody.figures.figure import Figure
 from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.roles import figure_roles
-from wholebody.motion.thing_contacts import least_distance, still_things
+from wholebody.motion.solids import least_distance
+from wholebody.motion.thing_contacts import still_things
 from wholebody.motion.windows import long_runs
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold

@@ -45,6 +45,7 @@ from wholebody.motion.thing_contacts import (
     hand_shares,
     own_contacts,
     own_rests,
+    said_of_many,
     still_things,
 )
 from wholebody.motion.touching import Touched
@@ -109,6 +110,8 @@ def retarget(
     function(progress, "progress")
     if scene is not None:
         same_figure(scene, figure, "retarget")
+        if said := said_of_many(scene):
+            warn(f"retarget: {said}")
     tracks = _tracks(motion, scene, things)
     surface = None if scene is None else surface_of(scene, tracks, motion.dt)
     if scene is not None and tracks and ground is not None and not isinstance(ground, Ground) and figure.root == "free":

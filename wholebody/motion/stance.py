@@ -25,7 +25,7 @@ from wholebody.geometry.pieces import swept_points
 from wholebody.motion.clip import Clip
 from wholebody.motion.footholds import Point, RestLimits, resting
 from wholebody.motion.roles import figure_roles
-from wholebody.motion.thing_contacts import least_distance
+from wholebody.motion.solids import least_distance
 from wholebody.motion.windows import Window, runs
 from wholebody.tasks import Hold
 

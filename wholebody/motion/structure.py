@@ -85,7 +85,8 @@ def _limb(start: int, children: list[list[int]], lengths: Array, reach: Array) -
     long = [k for k in long if len(children[joints[k + 1]]) == 1] or long
     first = next((k for k in reversed(long) if k + 3 < len(joints)), long[-1])
     bones = float(lengths[joints[first + 1]]), float(lengths[joints[first + 2]])
-    return _Limb(joints, first, bones) if sum(bones) > 0.4 * (reach[start] - lengths[start]) else None
+    long_enough = sum(bones) > 0.4 * (reach[start] - lengths[start]) and min(bones) > 0.0
+    return _Limb(joints, first, bones) if long_enough else None
 
 
 def built(motion: SkeletonMotion, stands: bool = False) -> dict[str, str]:
@@ -295,3 +296,21 @@ def recognised_unit(parents: Indices, offsets: Array) -> str:
             UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / 2.2))
         )  # m, along the bones from foot to head
     return "metres" if size <= 3.0 else "centimetres" if size <= 300.0 else "millimetres"
+
+
+def stands_along(motion: SkeletonMotion, axis: int) -> bool:
+    """Whether a person stands along an axis, on the ground at its zero, in most frames."""
+    pairs = limb_pairs(motion.parents, motion.offsets)
+    if not pairs:
+        return False
+    middles = [motion.positions[:, [one.joints[0], other.joints[0]]].mean(axis=1) for _, one, other in pairs]
+    hips, shoulders = sorted(middles, key=lambda middle: float(middle[:, axis].mean()))
+    upright = (shoulders - hips)[:, axis] > 0.8 * np.linalg.norm(shoulders - hips, axis=1)
+    lowest = motion.positions[:, :, axis].min(axis=1)
+    grounded = np.abs(lowest).max() < 0.1 * longest_way(motion.parents, motion.offsets)
+    return bool(grounded and upright.mean() > 0.5)
+
+
+def is_sized(parents: Indices, offsets: Array) -> bool:
+    """Whether a skeleton, metres, is of a person's size, or has not a person's structure."""
+    return not limb_pairs(parents, offsets) or 0.5 < longest_way(parents, offsets) < 5.0  # m, from foot to head

@@ -10,8 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.motion.solids import Solid
 from wholebody.scene.scene import Scene
 
+DEEP = 2.0  # m
 Surface: TypeAlias = Callable[[Array, int], float | None]
 """Height of the first surface below a place (3,) in a frame, metres."""
 
@@ -31,24 +33,24 @@ def surface_of(
 
     Things with `tracks` (n, 7), `dt` seconds a frame, have surfaces while they stand, those `without` none.
     """
-    still, moving = list[tuple[coal.CollisionGeometry, coal.Transform3s]](), {} if tracks is None else tracks
+    moving = {} if tracks is None else tracks
     pieces, stood = scene.geometry.geometryObjects, {name: stands(track, dt) for name, track in moving.items()}
-    for piece, owner in zip(pieces, scene.piece_owner, strict=True):
-        if owner in scene.objects and scene.objects[owner].segment is None and owner not in {*without, *moving}:
-            still.append((piece.geometry, coal.Transform3s(piece.placement.rotation, piece.placement.translation)))
+    still = Solid(
+        (piece.geometry, piece.placement)
+        for piece, owner in zip(pieces, scene.piece_owner, strict=True)
+        if owner in scene.objects and scene.objects[owner].segment is None and owner not in {*without, *moving}
+    )
     ball, request = coal.Sphere(1e-6), coal.DistanceRequest()
 
     def height(place: Array, frame: int) -> float | None:
-        found, here = list[float](), list(still)
+        found, here = list[float](), still.below(place, DEEP)
         for name, mask in stood.items():
             if mask[frame]:
                 at = pin.XYZQUATToSE3(moving[name][frame])
-                for index, local in scene.built.pieces_of[name]:
-                    there = at * local
-                    here.append((pieces[index].geometry, coal.Transform3s(there.rotation, there.translation)))
-        for shape, where in here:
-            at = np.array(place)
-            while at[2] > place[2] - 2.0:
+                here += [(pieces[index].geometry, at * local) for index, local in scene.built.pieces_of[name]]
+        for shape, there in here:
+            at, where = np.array(place), coal.Transform3s(there.rotation, there.translation)
+            while at[2] > place[2] - DEEP:
                 result = coal.DistanceResult()
                 gap = float(coal.distance(ball, coal.Transform3s(np.eye(3), at), shape, where, request, result))
                 if gap < 1e-5 and at[2] == place[2]:

@@ -12,7 +12,7 @@ a hand that rests does not hold the body.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -26,6 +26,7 @@ from wholebody.motion.footholds import RestLimits, slow
 from wholebody.motion.held_points import HeldPoint
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.solids import Placed, Solid
 from wholebody.motion.windows import long_runs, runs
 from wholebody.scene.scene import Scene
 
@@ -36,6 +37,9 @@ SHARES = (1.0, 0.5, 0.0)
 """Places of a hand that touch, from its wrist at 0 to its joint, which may be at the knuckles or beyond the fingers."""
 
 GOES_ON = 1.4  # times as far away as a contact may begin, it ends
+
+
+MANY = 1000  # pieces of a thing from which a frame takes seconds
 
 
 class ThingContact(NamedTuple):
@@ -59,25 +63,15 @@ def still_things(scene: Scene) -> list[str]:
     return [name for name in standing if not isinstance(scene.objects[name].shape, HalfSpace)]
 
 
-class Piece(NamedTuple):
-    """A piece of a thing."""
-
-    shape: coal.CollisionGeometry
-    at: pin.SE3  # in the thing's axes
-    reach: float  # metres from its origin to its farthest point
-
-
-Placed: TypeAlias = tuple[coal.CollisionGeometry, pin.SE3]  # a shape, and where it is in the world
-
-
-def least_distance(first: Sequence[Placed], second: Sequence[Placed]) -> float:
-    """Signed distance of two sets of shapes, metres."""
-    best, request = np.inf, coal.DistanceRequest()
-    for one, at in first:
-        for other, there in second:
-            ours, theirs = (coal.Transform3s(place.rotation, place.translation) for place in (at, there))
-            best = min(best, float(coal.distance(one, ours, other, theirs, request, coal.DistanceResult())))
-    return best
+def said_of_many(scene: Scene) -> str:
+    """What is known of things of very many pieces; empty without one."""
+    counts = {name: len(scene.built.pieces_of[name]) for name in still_things(scene)}
+    return "; ".join(
+        f"{name} is {count} pieces, which may take seconds a frame: a mesh that encloses nothing, such as a scan, is a "
+        "piece a triangle; close it, or give hulls of its parts"
+        for name, count in counts.items()
+        if count > MANY
+    )
 
 
 class Things:
@@ -88,12 +82,9 @@ class Things:
         self.tracks = tracks
         self._moving = {name: [pin.XYZQUATToSE3(one) for one in track] for name, track in tracks.items()}
         self._still = {name: scene.objects[name].placement for name in still_things(scene) if name not in tracks}
-        pieces, reach = scene.geometry.geometryObjects, scene.pair_table.reach
-        self._pieces: dict[str, list[Piece]] = {
-            name: [
-                Piece(pieces[index].geometry, local, float(reach[index]))
-                for index, local in scene.built.pieces_of[name]
-            ]
+        pieces = scene.geometry.geometryObjects
+        self._solids = {
+            name: Solid((pieces[index].geometry, local) for index, local in scene.built.pieces_of[name])
             for name in (*self._moving, *self._still)
         }
 
@@ -101,7 +92,7 @@ class Things:
         """Placements (n, 7) of a moving thing on a scaled way; its lowest point's height above z = 0 is scaled too."""
         track = np.array(self.tracks[name])
         lowest = np.full(len(track), np.inf)
-        for shape, local, _ in self._pieces[name]:
+        for shape, local in self._solids[name].placed:
             for frame, at in enumerate(self._moving[name]):
                 low = -support(shape, at * local, np.array((0.0, 0.0, -1.0)))
                 lowest[frame] = min(lowest[frame], low)
@@ -117,9 +108,10 @@ class Things:
         """Where the things that move are in a frame."""
         return {name: track[frame] for name, track in self._moving.items()}
 
-    def pieces(self, name: str, frame: int) -> list[Placed]:
-        """Shapes of a thing where they are in a frame."""
-        return [(shape, self.at(name, frame) * local) for shape, local, _ in self._pieces[name]]
+    def distance(self, name: str, frame: int, shapes: Sequence[Placed]) -> float:
+        """Signed distance of shapes in the world to a thing in a frame, metres."""
+        back = self.at(name, frame).inverse()
+        return self._solids[name].distance([(shape, back * at) for shape, at in shapes])
 
     def within(self, name: str, path: Array) -> Array:
         """A point's path (n, 3) in a thing's axes."""
@@ -128,7 +120,7 @@ class Things:
     def touched(self, name: str, path: Array, most: float, dt: float) -> Mask:
         """(n,) when a point of path (n, 3) goes with a thing, at `most` metres from it where that begins."""
         local = self.within(name, path)
-        away = np.array([nearest(self._pieces[name], place, GOES_ON * most)[0] for place in local])
+        away = np.array([self._solids[name].nearest(place, GOES_ON * most)[0] for place in local])
         return long_runs(near_and_slow(local, away, most, dt), max(1, round(RestLimits().least / dt)))
 
     def contacts(self, motion: SkeletonMotion, joints: Mapping[str, str]) -> list[ThingContact]:
@@ -143,14 +135,14 @@ class Things:
             start = motion.positions[:, motion.names.index(wrist)]
             shares = SHARES if wrist != joint else SHARES[:1]
             free: Mask = np.ones(len(motion), dtype=bool)
-            for name, pieces in self._pieces.items():
+            for name, solid in self._solids.items():
                 local = [self.within(name, start + share * (path - start)) for share in shares]
-                away = [np.array([nearest(pieces, one, GOES_ON * NEAR[part])[0] for one in each]) for each in local]
+                away = [np.array([solid.nearest(one, GOES_ON * NEAR[part])[0] for one in each]) for each in local]
                 touches = zip(local, away, strict=True)
                 mask = np.any([near_and_slow(*each, NEAR[part], motion.dt) for each in touches], axis=0) & free
                 for run in runs(long_runs(mask, max(1, round(RestLimits().least / motion.dt)))):
                     middles = [each[run.first : run.end].mean(axis=0) for each in local]
-                    ends = [nearest(pieces, middle) for middle in middles]
+                    ends = [solid.nearest(middle) for middle in middles]
                     share, (gap, place, normal) = min(zip(shares, ends, strict=True), key=lambda one: abs(one[1][0]))
                     found.append(ThingContact(role, *run, name, place, normal, share, away=max(gap, 0.0)))
                     free[run.first : run.end] = False
@@ -163,21 +155,6 @@ def near_and_slow(places: Array, away: Array, most: float, dt: float) -> Mask:
     for run in runs(away <= GOES_ON * most):
         near[run.first : run.end] = bool((away[run.first : run.end] <= most).any())
     return slow(places, dt, RestLimits()) & near
-
-
-def nearest(pieces: Sequence[Piece], point: Array, within: float = np.inf) -> tuple[float, Array, Array]:
-    """Signed distance of a point (3,) to a thing, the nearest place on its surface, and its normal out of it."""
-    best = np.inf, point, np.array([0.0, 0.0, 1.0])
-    center, ball, request = coal.Transform3s(np.eye(3), point), coal.Sphere(1e-6), coal.DistanceRequest()
-    for shape, at, reach in pieces:
-        if np.linalg.norm(at.translation - point) - reach > min(within, best[0]):
-            continue
-        result, where = coal.DistanceResult(), coal.Transform3s(at.rotation, at.translation)
-        gap = float(coal.distance(shape, where, ball, center, request, result))
-        normal = np.array(result.normal)
-        if gap < best[0] and np.isfinite(normal).all() and normal.any():
-            best = gap, np.array(result.getNearestPoint1()), normal
-    return best
 
 
 def thickness(pieces: Sequence[pin.GeometryObject], start: Array, along: Array) -> float:
@@ -270,23 +247,24 @@ def own_contacts(
     rests: Sequence[ThingContact], figure: Figure, roles: Roles, hands: Mapping[str, HeldPoint], free: Sequence[Array]
 ) -> list[ThingContact]:
     """The same of a figure, in its joints' axes: where `hands` are in the middle of each, in postures `free` (nq,)."""
-    model, data, pieces = figure.model, figure.model.createData(), dict[int, list[Piece]]()
+    model, data, pieces = figure.model, figure.model.createData(), dict[int, list[Placed]]()
     for piece in figure.geometry.geometryObjects:
-        pieces.setdefault(piece.parentJoint, []).append(Piece(piece.geometry, piece.placement, np.inf))
+        pieces.setdefault(piece.parentJoint, []).append((piece.geometry, piece.placement))
+    solids = {joint: Solid(placed) for joint, placed in pieces.items()}
     arms = {joint for role, (joint, _) in roles.places(figure).items() if role.split("_")[-1] in ARM}
-    body, found = [joint for joint in pieces if not arms & set(model.supports[joint])], []
+    body, found = [joint for joint in solids if not arms & set(model.supports[joint])], []
     for rest in rests:
         hand, other = hands[rest.role], hands.get(rest.thing)
         if other is None and not body:
             continue  # a body without pieces has nothing to touch
         pin.forwardKinematics(model, data, free[(rest.first + rest.end) // 2])
         here = data.oMi[hand.joint].act(hand.place)
-        near = {joint: nearest(pieces[joint], data.oMi[joint].actInv(here))[0] for joint in body}
+        near = {joint: solids[joint].nearest(data.oMi[joint].actInv(here))[0] for joint in body}
         base = min(near, key=lambda joint: near[joint]) if other is None else other.joint
         start = here if other is None else data.oMi[base].act(other.place)
-        if base in pieces:
+        if base in solids:
             # m: so far outside of a part, the nearest place on it is on the side that the hand came from
-            _, place, normal = nearest(pieces[base], data.oMi[base].actInv(start + 0.1 * rest.normal))
+            _, place, normal = solids[base].nearest(data.oMi[base].actInv(start + 0.1 * rest.normal))
         else:
             place = data.oMi[base].actInv(start + 0.5 * HAND * rest.normal)
             normal = data.oMi[base].rotation.T @ rest.normal

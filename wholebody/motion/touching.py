@@ -13,7 +13,8 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.held_points import HeldPoint, part_corners
 from wholebody.motion.posture_fit import CLEARANCE
 from wholebody.motion.roles import figure_roles
-from wholebody.motion.thing_contacts import Placed, ThingContact, Things, least_distance, thickness
+from wholebody.motion.solids import Placed, least_distance
+from wholebody.motion.thing_contacts import ThingContact, Things, thickness
 
 NEXT = "shoulder", "elbow", "knee", "ankle", "toe"  # where another part of a body begins: thighs sit
 
@@ -60,7 +61,7 @@ class Touched:
         pin.forwardKinematics(self._figure.model, self._data, q)
         own = self._part(point.joint, point.place, contact.away, alone=alone)
         if not contact.base:
-            return least_distance(own, self.things.pieces(contact.thing, frame))
+            return self.things.distance(contact.thing, frame, own)
         center = contact.place - contact.away * contact.normal
         other = self._part(contact.base, center, contact.away, most=int(contact.thing.endswith("hand")))
         return least_distance(own, other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +144,38 @@ def test_a_person_whose_root_is_turned_stands_along_the_axis_that_is_up_in_the_m
     rows[:, :3] = [0.0, 0.96, 0.0]
     path.write_text(text(body, rows))
     assert read_skeleton(path).notes[0] == "y is up"
+
+
+def test_a_stated_unit_or_axis_that_makes_no_person_is_told(tmp_path: Path) -> None:
+    body, path = skeleton_of_a_person(100.0), tmp_path / "a.bvh"
+    rows = np.zeros((4, 6 + 3 * body.count("JOINT")))
+    rows[:, 1] = 96.0
+    path.write_text(text(body, rows))
+    with pytest.warns(UserWarning, match=r"^a\.bvh: in metres the person is \d+ m long, .* leave the unit out"):
+        far = read_skeleton(path, unit="metres")
+    assert np.linalg.norm(far.offsets, axis=1).max() == pytest.approx(42.0)  # it is followed all the same
+    with pytest.warns(UserWarning, match=r"^a\.bvh: with z up the person lies, and with y up stands"):
+        lying = read_skeleton(path, up="z")
+    np.testing.assert_allclose(lying.positions[:, 0], [[0.0, 0.96, 0.0]] * 4, atol=1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_skeleton(path, unit="centimetres", up="y")
+        turned = np.array(rows)
+        turned[:, :6] = 0.0, 0.0, 96.0, 0.0, 90.0, 0.0
+        path.write_text(text(body, turned))
+        read_skeleton(path, unit="centimetres", up="z")
+    with pytest.warns(UserWarning, match=r"with y up the person lies, and with z up stands"):
+        read_skeleton(path, up="y")
+
+
+def test_bones_without_length_make_no_limbs(tmp_path: Path) -> None:
+    inner = f"JOINT t {{ OFFSET 0 0 0 CHANNELS {PLAIN}\nEnd Site {{ OFFSET 0 8 0 }} }}"
+    stub = f"JOINT s {{ OFFSET 10 0 0 CHANNELS {PLAIN}\n{inner} }}"
+    body, path = f"ROOT b {{ OFFSET 0 0 0 CHANNELS {SIX}\n{' '.join([stub] * 4)} }}", tmp_path / "a.bvh"
+    path.write_text(text(body, np.zeros((2, 6 + 4 * 6))))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "lengths are in centimetres" in read_skeleton(path).notes
 
 
 def test_a_written_person_who_lies_with_the_feet_at_the_origin_lies_when_read(tmp_path: Path, human: wb.Figure) -> None:

@@ -404,6 +404,23 @@ def test_an_archive_of_amass_stands_upright_and_faces_forward(tmp_path: Path, hu
     np.testing.assert_array_equal(shaped.positions, motion.positions)
 
 
+def test_an_archive_of_a_person_along_y_stands_too_and_its_unit_is_metres(tmp_path: Path) -> None:
+    """A root of no turn leaves the template as it is: y up, z forward, its origin 1.15 m above the soles."""
+    path = amass(tmp_path / "a.npz", poses=np.zeros((7, 156)), trans=np.tile([0.0, 1.15, 0.0], (7, 1)))
+    found = wb.motion.read_skeleton(path)
+    assert "y is up" in found.notes
+    at = dict(zip(found.names, found.positions[0], strict=True))
+    assert at["head"][2] > at["pelvis"][2] + 0.4 > at["left_ankle"][2] + 0.8
+    assert 0.0 < at["left_ankle"][2] < 0.15
+    assert at["left_foot"][0] > at["left_ankle"][0] + 0.1  # z of the file is x
+    np.testing.assert_array_equal(wb.motion.read_skeleton(path, up="y").positions, found.positions)
+    with pytest.warns(UserWarning, match="with z up the person lies, and with y up stands"):
+        lying = wb.motion.read_skeleton(path, up="z")
+    np.testing.assert_allclose(found.positions, lying.positions[:, :, [2, 0, 1]], atol=1e-12)
+    with pytest.raises(wb.InputError, match=r"^a\.npz: an archive of AMASS has metres, not inches; leave the unit out"):
+        wb.motion.read_skeleton(path, unit="inches")
+
+
 @pytest.mark.parametrize(("columns", "model", "down"), [(72, None, 0.22), (156, "smplh", 0.22), (165, None, 0.35)])
 def test_a_body_of_amass_turns_about_its_pelvis_beside_the_place_of_the_archive(
     tmp_path: Path, columns: int, model: str | None, down: float
@@ -498,11 +515,21 @@ def test_an_unknown_ending_is_answered_with_all_that_can_be_read(human: Figure, 
         wb.read_clip(tmp_path / "walk.mocap", human)
 
 
-def test_fbx_is_answered_with_what_turns_it_into_what_is_read(human: Figure, tmp_path: Path) -> None:
-    (tmp_path / "walk.fbx").write_bytes(b"Kaydara FBX Binary  ")
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("walk.fbx", "FBX is not read; Blender .*Export > glTF"),
+        ("Walk.C3D", "holds places of markers and no skeleton; .* export BVH$"),
+        ("walk.trc", "holds places of markers and no skeleton"),
+    ],
+)
+def test_what_is_not_read_is_answered_with_what_turns_it_into_what_is(
+    name: str, said: str, human: Figure, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_bytes(b"Kaydara FBX Binary  ")
     for read in (wb.motion.read_skeleton, partial(wb.read_clip, figure=human)):
-        with pytest.raises(wb.FileFormatError, match=r"walk\.fbx: FBX is not read; Blender .*Export > glTF"):
-            read(tmp_path / "walk.fbx")
+        with pytest.raises(wb.FileFormatError, match=rf"^{name}: {said}"):
+            read(tmp_path / name)
 
 
 @pytest.mark.parametrize("dtype", ["int8", "float64"])

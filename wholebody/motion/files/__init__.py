@@ -38,7 +38,13 @@ SKELETONS: dict[str, Callable[[Path, str | None, str | None], SkeletonMotion | N
 }
 """Ending of a name to the function that reads a skeleton, with its unit and axis; None of a file that holds none."""
 
-FBX = "FBX is not read; Blender turns it into what is: File > Import > FBX, then File > Export > glTF 2.0 (.glb)"
+MARKERS = "holds places of markers and no skeleton; solve it in the program that recorded it, and export BVH"
+OTHERS = {
+    ".fbx": "FBX is not read; Blender turns it into what is: File > Import > FBX, then File > Export > glTF 2.0 (.glb)",
+    ".c3d": MARKERS,
+    ".trc": MARKERS,
+}
+"""Ending of a name to what is said of motion that is not read."""
 
 
 def write_motion(motion: Motion, path: str | os.PathLike[str], *, bare: bool = False) -> Path:
@@ -69,8 +75,8 @@ def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
 
 def _ending(path: Path, known: Collection[str], done: str) -> str:
     ending = path.suffix.lower()
-    if ending == ".fbx" and done == "read":
-        raise FileFormatError(f"{one_line(path.name)}: {FBX}")
+    if ending in OTHERS and done == "read":
+        raise FileFormatError(f"{one_line(path.name)}: {OTHERS[ending]}")
     if ending not in known:
         raise FileFormatError(
             f"{one_line(path.name)}: a clip cannot be {done} as {one_line(ending) or 'a file without ending'}; "

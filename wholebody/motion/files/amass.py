@@ -6,6 +6,7 @@ place of them; retargeting replaces lengths by the figure's anyway.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import packaged_table, title_of
 from wholebody.motion.clip import LARGEST, MOST_FRAMES
 from wholebody.motion.files.archive import read_arrays
-from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.skeleton import UP, SkeletonMotion
+from wholebody.motion.structure import stands_along
 
 BODY = 22  # joints whose poses every version has; SMPL's two hands are joints only there
 
@@ -28,11 +30,16 @@ PELVIS = {"smpl": (-0.002, -0.223, 0.028), "smplx": (0.003, -0.351, 0.012)}
 """Pelvis of an average body in the template's axes, metres: `trans` moves the origin of these, which turns do not."""
 
 
-def read_motion(path: Path, _unit: str | None = None, _up: str | None = None) -> SkeletonMotion | None:
-    """Read the body of an AMASS archive, in metres with z up; None of another archive."""
+def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion | None:
+    """Read the body of an AMASS archive, in metres with z up; None of another archive.
+
+    AMASS has z up; archives that others made of videos have y up.
+    """
     name, arrays = one_line(path.name), read_arrays(path)
     if "trans" not in arrays or not ("poses" in arrays or {"root_orient", "pose_body"} <= arrays.keys()):
         return None
+    if unit not in (None, "metres"):
+        raise InputError(f"{name}: an archive of AMASS has metres, not {unit}; leave the unit out")
     poses, places, frequency = _arrays(name, arrays)
     frames = len(poses)
     whole = str(arrays.get("surface_model_type", "")).lower() == "smplx" or poses.shape[1] == 3 * 55
@@ -45,12 +52,14 @@ def read_motion(path: Path, _unit: str | None = None, _up: str | None = None) ->
     local[:, 0] = turns[:, 0] @ TEMPLATE.T
     local[:, 1:BODY] = TEMPLATE @ turns[:, 1:] @ TEMPLATE.T
     parents = np.array([names.index(bone["parent"]) if bone["parent"] else -1 for bone in bones], dtype=np.intp)
+    root, notes = places + PELVIS["smplx" if whole else "smpl"], ["lengths of bones are those of an average body"]
     try:
-        return SkeletonMotion.moved(
-            names, parents, offsets @ TEMPLATE.T, local, places + PELVIS["smplx" if whole else "smpl"],
-            1.0 / frequency, title_of(path),
-            ("lengths of bones are those of an average body",),
-        )  # fmt: skip
+        made = partial(SkeletonMotion.moved, names, parents, offsets @ TEMPLATE.T, dt=1.0 / frequency)
+        if up is None and stands_along(made(local=local, root=root), 1):
+            up, notes = "y", [*notes, "y is up"]
+        if up == "y":
+            local[:, 0], root = UP["y"] @ local[:, 0], root @ UP["y"].T
+        return made(local=local, root=root, name=title_of(path), notes=tuple(notes))
     except InputError as error:
         raise FileFormatError(f"{name}: {error}") from None
 

@@ -19,7 +19,7 @@ from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
 from wholebody.motion.files.bvh_text import BvhText, parsed
 from wholebody.motion.files.nodes import OFF, Node, angles_about, nodes_of, postures, rotations, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
-from wholebody.motion.structure import limb_pairs, recognised_unit
+from wholebody.motion.structure import recognised_unit, stands_along
 
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
@@ -163,19 +163,10 @@ def _up(joints: Sequence[str], parents: Indices, offsets: Array, root: int = 0) 
 
 def _other_up(up: str, parents: Indices, offsets: Array, local: Array, root: Array) -> str:
     """The other axis where a person stands along it on the ground, as a root that is turned makes it; else `up`."""
-    pairs, other = limb_pairs(parents, offsets), "z" if up == "y" else "y"
-    if not pairs:
-        return up
-    picked, at = np.linspace(0, len(local) - 1, min(len(local), 16)).astype(np.intp), "xyz".index(other)
-    positions = SkeletonMotion.moved(
-        tuple(map(str, range(len(parents)))), parents, offsets, local[picked], root[picked], 1.0
-    ).positions
-    middles = [positions[:, [one.joints[0], another.joints[0]]].mean(axis=1) for _, one, another in pairs]
-    hips, shoulders = sorted(middles, key=lambda middle: float(middle[:, at].mean()))
-    upright = (shoulders - hips)[:, at] > 0.8 * np.linalg.norm(shoulders - hips, axis=1)
-    lowest = positions[:, :, at].min(axis=1)
-    grounded = np.abs(lowest).max() < 0.1 * longest_way(parents, offsets)
-    return other if grounded and upright.mean() > 0.5 else up
+    other = "z" if up == "y" else "y"
+    picked, names = np.linspace(0, len(local) - 1, min(len(local), 16)).astype(np.intp), map(str, range(len(parents)))
+    motion = SkeletonMotion.moved(tuple(names), parents, offsets, local[picked], root[picked], 1.0)
+    return other if stands_along(motion, "xyz".index(other)) else up
 
 
 ORDER = "ZXY"  # of rotations, as most writers of BVH have it

@@ -22,7 +22,7 @@ from wholebody.motion.files.base import Frames
 from wholebody.motion.files.gltf import JOINT
 from wholebody.motion.files.nodes import OFF, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
-from wholebody.motion.structure import limb_pairs, recognised_unit
+from wholebody.motion.structure import is_sized, recognised_unit
 
 ENDINGS = (".glb", ".gltf")
 PATHS = ("translation", "rotation", "scale")
@@ -134,7 +134,7 @@ def _skeleton(animated: Animated, unit: str | None, up: str | None) -> SkeletonM
         raise FileFormatError(f"{title}: all joints of the skeleton are at one place")
     if unit is None:
         unit = "metres"
-        if limb_pairs(parents, offsets) and not 0.5 < size < 5.0:  # m, from foot to head: exporters forget the unit
+        if not is_sized(parents, offsets):  # exporters forget the unit
             unit = recognised_unit(parents, offsets)
             notes += [f"lengths are in {unit}, though the format has metres"] if unit != "metres" else []
     scale = UNITS[unit]
