@@ -182,7 +182,7 @@ class Facing(NamedTuple):
         components = (axes @ direction).tolist()
         wrench = np.zeros((2, 6))
         wrench[:, 3:] = (equidistant_jacobian(*components) @ axes) @ pin.skew(direction)
-        return equidistant_error(*components), between(state, wrench, self.place.joint, self.face.joint)
+        return equidistant_error(*components), self.face.rows(state, wrench, self.place.joint)
 
 
 class Level(NamedTuple):
@@ -198,7 +198,7 @@ class Level(NamedTuple):
         normal = self.face.at(state)[1][2]
         axis = state.frame(self.place.frame).rotation @ self.axis
         wrench = np.array([[0.0, 0.0, 0.0, *(pin.skew(axis) @ normal)]])
-        return np.array([axis @ normal]), between(state, wrench, self.place.joint, self.face.joint)
+        return np.array([axis @ normal]), self.face.rows(state, wrench, self.place.joint)
 
 
 class Over(NamedTuple):
@@ -228,7 +228,7 @@ class Over(NamedTuple):
         center, axes = self.face.at(state)
         axes = axes[: len(self.low)]
         point = state.frame(self.place.frame).act(self.offset)
-        return axes @ (point - center), between(state, through(point, axes), self.place.joint, self.face.joint)
+        return axes @ (point - center), self.face.rows(state, through(point, axes), self.place.joint)
 
 
 def through(point: Array, forces: Array) -> Array:

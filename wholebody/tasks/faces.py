@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
-from wholebody.figures.state import State
+from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks.axis import across
 from wholebody.tasks.surfaces import Surface, of_pieces, outermost, surface
@@ -37,6 +37,10 @@ class Face(NamedTuple):
         """Middle (3,) and axes (3, 3) in the world."""
         place = self.surface.placed(0, state)
         return place.act(self.center), self.axes @ place.rotation.T
+
+    def rows(self, state: State, wrench: Array, joint: int) -> Array:
+        """Rows (m, nv) of wrenches (m, 6) on a joint against what has the face."""
+        return state.wrench_jacobian(Wrench(wrench, joint, self.joint))
 
 
 def face(scene: Scene, name: str, direction: Array, state: State, where: str) -> Face:

@@ -141,7 +141,7 @@ class Grasp(ContactTerm):
     def _power(
         self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
-        rim = rim_of(thing, self._outwards(scene, state), state)
+        rim = rim_of(thing, place, self._outwards(scene, state), state)
         if rim is not None and self.along is not None:
             raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
         bar = bar_of(thing, state, where) if rim is None else rim
@@ -159,8 +159,8 @@ class Grasp(ContactTerm):
             Crossing(place, bar, low, high, room),
         ]
         if rim is not None:
-            outwards = with_values(rim, axes=rim.axes[[1, 0, 2]])
-            parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
+            # outside of it, and on the hand's side of the middle
+            parts += [Over(place, each, np.zeros(2), np.full(2, np.inf)) for each in (rim, rim.ring)]
         parts += [Gap(finger, thing) for finger in fingers.values()]
         thumb = fingers.pop("thumb", hand)
         if others := tuple(fingers.values()):
