@@ -99,7 +99,9 @@ def rim_of(thing: Surface, place: Place, outwards: Array, state: State) -> Rim |
     if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
     shapes = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes)]
-    points = 0.5 * np.array([[_support([one], way) - _support([one], -way) for way in np.eye(3)] for one in shapes])
+    at = thing.placed(0, state)
+    axes = at.rotation.T  # middles of boxes along these are the same wherever the ring is
+    points = 0.5 * np.array([[_support([one], way) - _support([one], -way) for way in axes] for one in shapes]) @ axes
     center = points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(points - center, full_matrices=False)
     way = (points - center) @ axes.T
@@ -114,10 +116,9 @@ def rim_of(thing: Surface, place: Place, outwards: Array, state: State) -> Rim |
         up = np.array((0.0, 0.0, 1.0))
         level = up - (up @ n) * n
     e = level / np.linalg.norm(level)
-    at = thing.placed(0, state)
     local = np.array([*quarter(e, cross(n, e)), n]) @ at.rotation
     ring = Face(thing, at.actInv(center), local, np.full(2, radius))
-    thick = 0.5 * (_support(shapes, n) + _support(shapes, -n) - 2.0 * float(n @ center))
+    thick = 0.5 * (_support(shapes, n) + _support(shapes, -n))
     return Rim(ring, place, radius, np.array([thick, thick, radius]))
 
 
