@@ -144,6 +144,19 @@ def test_a_line_says_how_people_sit_kneel_and_stand_on_things(line: str, given: 
     assert np.degrees(person.joint_values(solution.q)["neck1_flexion"]) == pytest.approx(0.0, abs=15.0)
 
 
+@pytest.mark.parametrize("start", ["supine", "standing"])
+def test_somebody_lies_on_the_back(start: str) -> None:
+    man = wb.load("human", stature=1.74, mass=100.0)
+    lying = [wb.tasks.Lean("floor", part=part, side=(-1, 0, 0)) for part in ("pelvis", "thorax")]
+    solution = wb.solve(wb.Problem(room(man), start, constraints=lying))
+    assert solution.solved, solution.message
+    for part in ("pelvis", "thorax"):
+        assert man.placement(solution.q, part).rotation[2, 0] > 0.99  # its front looks up
+    heights = [man.placement(solution.q, frame).translation[2] for frame in ("head_top", "left_heel", "right_heel")]
+    assert min(heights) > 0.0
+    assert max(heights) < 0.2
+
+
 def driving(person: wb.Figure) -> wb.Problem:
     """The driver of the guide."""
 

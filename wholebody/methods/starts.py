@@ -206,7 +206,7 @@ def arms_ahead(problem: Problem, state: State, start: Array) -> Iterator[Array]:
 
 def _reaching(problem: Problem, start: Array, body: str) -> Indices:
     """Degrees of freedom of those arms of a body that a term moves."""
-    figure, terms = problem.scene.figure, (*problem.goals, *problem.stated)
+    figure, terms = problem.scene.figure, tuple[Any, ...]((*problem.goals, *problem.stated))
     free = {arm.replace("_upper", "") for arm in free_arms(problem.scene, start, terms, problem.bounds, {body})}
     groups = [f"{body}{side}_arm" for side in ("left", "right")]
     return figure.dofs([arm for arm in groups if arm in figure.groups and arm not in free])

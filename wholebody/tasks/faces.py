@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import coal
 import numpy as np
@@ -18,6 +18,16 @@ from wholebody.tasks.surfaces import Surface, of_pieces, outermost, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 SMALLER = 0.4  # share of the largest face's area from which another one counts; less: tops of backrests, rests for arms
+
+
+class Carried(Protocol):
+    """A place with axes that goes with a thing: a face, or the bar of a grip."""
+
+    def at(self, state: State) -> tuple[Array, Array]:
+        """Middle (3,) and axes (3, 3) in the world."""
+
+    def rows(self, state: State, wrench: Array, joint: int) -> Array:
+        """Rows (m, nv) of wrenches (m, 6) on a joint against it."""
 
 
 class Face(NamedTuple):
