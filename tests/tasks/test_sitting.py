@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -141,3 +142,43 @@ def test_a_line_says_how_people_sit_kneel_and_stand_on_things(line: str, given: 
     ahead = np.degrees(person.joint_values(solution.q)["left_hip_flexion"])
     assert ahead == pytest.approx({"step": 57.0, "rung": 76.0, "one knee": 90.0}.get(line, ahead), abs=12.0)
     assert np.degrees(person.joint_values(solution.q)["neck1_flexion"]) == pytest.approx(0.0, abs=15.0)
+
+
+@pytest.mark.parametrize("start", ["supine", "standing"])
+def test_somebody_lies_on_the_back(start: str) -> None:
+    man = wb.load("human", stature=1.74, mass=100.0)
+    lying = [wb.tasks.Lean("floor", part=part, side=(-1, 0, 0)) for part in ("pelvis", "thorax")]
+    solution = wb.solve(wb.Problem(room(man), start, constraints=lying))
+    assert solution.solved, solution.message
+    for part in ("pelvis", "thorax"):
+        assert man.placement(solution.q, part).rotation[2, 0] > 0.99  # its front looks up
+    heights = [man.placement(solution.q, frame).translation[2] for frame in ("head_top", "left_heel", "right_heel")]
+    assert min(heights) > 0.0
+    assert max(heights) < 0.2
+
+
+def driving(person: wb.Figure) -> wb.Problem:
+    """The driver of the guide."""
+
+    def at(x: float, z: float, degrees: float) -> pin.SE3:
+        return pin.SE3(pin.utils.rotate("y", np.radians(degrees)), np.array((x, 0.0, z)))
+
+    car = wb.Scene(person).add(wb.Box((0.50, 0.52, 0.08)), name="seat", at=at(-0.30, 0.26, 0.0))
+    car.add(wb.Box((0.08, 0.52, 0.60)), name="backrest", at=at(-0.60, 0.60, -12.0))
+    car.add(wb.Box((0.35, 0.60, 0.02)), name="pedals", at=at(0.45, 0.13, -25.0))
+    car.add(wb.Torus(0.18, 0.015), name="wheel", at=at(0.05, 0.75, -65.0))
+    grips = [wb.Grasp(side, "wheel", "power") for side in ("left", "right")]
+    ahead = wb.Axis("gaze", (1, 0, 0), direction=(1, 0, -0.1), weight=0.1)
+    goals = [wb.Sit("seat", back="backrest"), *grips, ahead]
+    return wb.Problem(car, "sitting", goals=goals, constraints=[wb.Stand("pedals", balance=False)])
+
+
+def test_drivers_of_neighbouring_statures_hold_the_wheel_alike() -> None:
+    """With the rim as a straight bar, and hands from below, forearms turned by up to 58 degrees between two of them."""
+    people = [wb.load("human", percentile=each) for each in (57.0, 62.0, 67.0, 72.0, 77.0)]
+    postures = []
+    for person in people:
+        solution = wb.solve(driving(person))
+        assert solution.solved, solution.message
+        postures.append(solution.q[7:])
+    assert np.degrees(np.abs(np.diff(postures, axis=0))).max() < 10.0

@@ -10,7 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.hand import opened_for_a_bar
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction
@@ -180,9 +180,7 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arm
         middle, axes = face.at(state.update(start))
         pelvis = figure.placement(figure.posture(f"{body}sitting"), figure.model.frames[place.frame].name)
         at = middle + high * axes[2]
-        free = {arm.replace("_upper", "") for arm in free_arms(problem.scene, start, stated, problem.bounds, {body})}
-        groups = [f"{body}{side}_arm" for side in ("left", "right")]
-        reaching = figure.dofs([arm for arm in groups if arm in figure.groups and arm not in free])
+        reaching = _reaching(problem, start, body)
         moves.append([])
         for turn in HEADINGS:
             way = axes[:2] @ turn.rotation[:, 0]
@@ -193,6 +191,25 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arm
     together = [np.sum(each, axis=0) for each in zip(*moves, strict=True)] if len(moves) > 1 else []
     for move in (*chain.from_iterable(moves), *together):
         yield _moved(problem, state, start, move)
+
+
+def arms_ahead(problem: Problem, state: State, start: Array) -> Iterator[Array]:
+    """The start (nq,) with all arms that reach as in the posture "arms_forward"; nothing where none does."""
+    figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
+    for body in figure.bodies:
+        if (name := f"{body}arms_forward") in figure.postures:
+            reaching = _reaching(problem, start, body)
+            move[reaching] = pin.difference(figure.model, start, figure.posture(name))[reaching]
+    if move.any():
+        yield _moved(problem, state, start, move)
+
+
+def _reaching(problem: Problem, start: Array, body: str) -> Indices:
+    """Degrees of freedom of those arms of a body that a term moves."""
+    figure, terms = problem.scene.figure, tuple[Any, ...]((*problem.goals, *problem.stated))
+    free = {arm.replace("_upper", "") for arm in free_arms(problem.scene, start, terms, problem.bounds, {body})}
+    groups = [f"{body}{side}_arm" for side in ("left", "right")]
+    return figure.dofs([arm for arm in groups if arm in figure.groups and arm not in free])
 
 
 def _root_at(problem: Problem, q: Array, body: str | None, posture: str = "") -> pin.SE3 | None:

@@ -14,7 +14,7 @@ from wholebody.base.arrays import Array, Mask, cross, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes, filled
-from wholebody.tasks.faces import Face
+from wholebody.tasks.faces import Carried, Face
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.kinks import MOST_FACES, bends, crossed_edges, faces_met
 from wholebody.tasks.surfaces import Nearest, Surface, foot, nearest
@@ -168,7 +168,7 @@ class Facing(NamedTuple):
 
     place: Place  # the frame and its joint
     basis: Array  # (3, 3) rows in the frame: two directions across the axis, and the axis
-    face: Face  # the face
+    face: Carried  # the face
     direction: Array  # (3,) in the face's own axes, unit
     either: bool = False  # whether the opposite direction will do as well: the nearer one counts
     in_radians: tuple[bool, ...] = (True, True)
@@ -182,7 +182,7 @@ class Facing(NamedTuple):
         components = (axes @ direction).tolist()
         wrench = np.zeros((2, 6))
         wrench[:, 3:] = (equidistant_jacobian(*components) @ axes) @ pin.skew(direction)
-        return equidistant_error(*components), between(state, wrench, self.place.joint, self.face.joint)
+        return equidistant_error(*components), self.face.rows(state, wrench, self.place.joint)
 
 
 class Level(NamedTuple):
@@ -198,14 +198,14 @@ class Level(NamedTuple):
         normal = self.face.at(state)[1][2]
         axis = state.frame(self.place.frame).rotation @ self.axis
         wrench = np.array([[0.0, 0.0, 0.0, *(pin.skew(axis) @ normal)]])
-        return np.array([axis @ normal]), between(state, wrench, self.place.joint, self.face.joint)
+        return np.array([axis @ normal]), self.face.rows(state, wrench, self.place.joint)
 
 
 class Over(NamedTuple):
     """A point of a frame within a box that stands on a face: rows are zero within, and its distances outside [m]."""
 
     place: Place  # the frame and its joint
-    face: Face  # the face
+    face: Carried  # the face
     low: Array  # (k,) ends along the face's first k axes: across it and, with three, along its normal
     high: Array
     offset: Array = np.zeros(3)  # (3,) the point in the frame
@@ -228,7 +228,7 @@ class Over(NamedTuple):
         center, axes = self.face.at(state)
         axes = axes[: len(self.low)]
         point = state.frame(self.place.frame).act(self.offset)
-        return axes @ (point - center), between(state, through(point, axes), self.place.joint, self.face.joint)
+        return axes @ (point - center), self.face.rows(state, through(point, axes), self.place.joint)
 
 
 def through(point: Array, forces: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import coal
 import numpy as np
@@ -11,13 +11,23 @@ import numpy as np
 from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
-from wholebody.figures.state import State
+from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks.axis import across
 from wholebody.tasks.surfaces import Surface, of_pieces, outermost, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 SMALLER = 0.4  # share of the largest face's area from which another one counts; less: tops of backrests, rests for arms
+
+
+class Carried(Protocol):
+    """A place with axes that goes with a thing: a face, or the bar of a grip."""
+
+    def at(self, state: State) -> tuple[Array, Array]:
+        """Middle (3,) and axes (3, 3) in the world."""
+
+    def rows(self, state: State, wrench: Array, joint: int) -> Array:
+        """Rows (m, nv) of wrenches (m, 6) on a joint against it."""
 
 
 class Face(NamedTuple):
@@ -37,6 +47,10 @@ class Face(NamedTuple):
         """Middle (3,) and axes (3, 3) in the world."""
         place = self.surface.placed(0, state)
         return place.act(self.center), self.axes @ place.rotation.T
+
+    def rows(self, state: State, wrench: Array, joint: int) -> Array:
+        """Rows (m, nv) of wrenches (m, 6) on a joint against what has the face."""
+        return state.wrench_jacobian(Wrench(wrench, joint, self.joint))
 
 
 def face(scene: Scene, name: str, direction: Array, state: State, where: str) -> Face:

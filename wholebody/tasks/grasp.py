@@ -41,10 +41,11 @@ class Grasp(ContactTerm):
     - "palm": the flat hand lies on a face of the thing. The hand touches it, z looks into the face, and the palm is
       over the face, a tenth within its edges. The hand may turn about z.
     - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
-      touches the thing. A ring, such as a wheel, is held by its rim, with the palm outside of it. Where the hand has
-      fingers, the two outer parts of each touch the thing too, and the thumb opposes the four fingers; around a bar
-      thinner than 23 mm the thumb lies over the fingers, which oppose the palm. One thinner than 16 mm lies in the
-      fingers: its far side is at most 16 mm from the palm.
+      touches the thing. A ring, such as a wheel, is held by its rim: anywhere in the quarter on the hand's side, along
+      the tangent there, with the palm outside of it, within 45 degrees. Where the hand has fingers, the two outer parts
+      of each touch the thing too, and the thumb opposes the four fingers; around a bar thinner than 23 mm the thumb
+      lies over the fingers, which oppose the palm. One thinner than 16 mm lies in the fingers: its far side is at most
+      16 mm from the palm.
     - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the figure has such
       segments, otherwise their tips, which have to move apart.
     - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
@@ -141,7 +142,7 @@ class Grasp(ContactTerm):
     def _power(
         self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
-        rim = rim_of(thing, self._outwards(scene, state), state)
+        rim = rim_of(thing, place, self._outwards(scene, state), state)
         if rim is not None and self.along is not None:
             raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
         bar = bar_of(thing, state, where) if rim is None else rim
@@ -159,8 +160,8 @@ class Grasp(ContactTerm):
             Crossing(place, bar, low, high, room),
         ]
         if rim is not None:
-            outwards = with_values(rim, axes=rim.axes[[1, 0, 2]])
-            parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
+            # each within a quarter: of the tube the palm is outside, and of the ring on the hand's side
+            parts += [Over(place, each, np.zeros(2), np.full(2, np.inf)) for each in (rim, rim.ring)]
         parts += [Gap(finger, thing) for finger in fingers.values()]
         thumb = fingers.pop("thumb", hand)
         if others := tuple(fingers.values()):

@@ -51,12 +51,57 @@ def _support(pieces: Iterable[tuple[Any, Any]], way: Array) -> float:
     return max(float((outermost(shape, place, way) @ way).max()) for shape, place in pieces)
 
 
-def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
-    """The rim of a ring in a direction (3,) from its middle, as a bar: outwards, along the rim; None for no ring."""
+class Rim(NamedTuple):
+    """The rim of a ring where it is nearest to a palm, as a bar whose axes are outwards, the ring's and the tangent.
+
+    It goes with the palm: where the palm moves by v along the tangent, at a distance r from the ring's axis, the bar
+    turns about that axis by v / r.
+    """
+
+    ring: Face  # its middle; the axes of the ring's plane, the first one to the hand's side, and its own
+    place: Place  # the palm
+    radius: float  # from the middle to the bar [m]
+    half: Array  # (3,) of the bar, as of `bar_of` [m]
+
+    @property
+    def joint(self) -> int:
+        """Joint that carries the ring."""
+        return self.ring.joint
+
+    def at(self, state: State) -> tuple[Array, Array]:
+        """Middle (3,) and axes (3, 3) in the world."""
+        middle, out, axis, _ = self._outwards(state)
+        return middle + self.radius * out, np.array([*quarter(out, axis), cross(axis, out)])
+
+    def rows(self, state: State, wrench: Array, joint: int) -> Array:
+        """Rows (m, nv) of wrenches (m, 6) on a joint against the bar."""
+        middle, out, axis, r = self._outwards(state)
+        palm = state.frame(self.place.frame).translation
+        turned = wrench[:, :3] @ cross(middle, axis) + wrench[:, 3:] @ axis
+        return self.ring.rows(state, wrench - np.outer(turned / r, through(palm, cross(axis, out)[None])), joint)
+
+    def _outwards(self, state: State) -> tuple[Array, Array, Array, float]:
+        """The ring's middle (3,), directions (3,) outwards and of its axis, and how far the palm is from that [m]."""
+        middle, axes = self.ring.at(state)
+        way = state.frame(self.place.frame).translation - middle
+        flat = way - (way @ axes[2]) * axes[2]
+        r = float(np.linalg.norm(flat))
+        return (middle, flat / r, axes[2], r) if r > SHORTEST else (middle, axes[0], axes[2], np.inf)
+
+
+def quarter(middle: Array, across: Array) -> tuple[Array, Array]:
+    """Normals (3,) of the two sides of the quarter about a unit direction (3,), in its plane with one across it."""
+    return (middle + across) / np.sqrt(2.0), (middle - across) / np.sqrt(2.0)
+
+
+def rim_of(thing: Surface, place: Place, outwards: Array, state: State) -> Rim | None:
+    """The rim of a ring for the palm, on its side in a direction (3,); None for no ring."""
     if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
     shapes = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes)]
-    points = 0.5 * np.array([[_support([one], way) - _support([one], -way) for way in np.eye(3)] for one in shapes])
+    at = thing.placed(0, state)
+    axes = at.rotation.T  # middles of boxes along these are the same wherever the ring is
+    points = 0.5 * np.array([[_support([one], way) - _support([one], -way) for way in axes] for one in shapes]) @ axes
     center = points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(points - center, full_matrices=False)
     way = (points - center) @ axes.T
@@ -71,11 +116,10 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
         up = np.array((0.0, 0.0, 1.0))
         level = up - (up @ n) * n
     e = level / np.linalg.norm(level)
-    at = thing.placed(0, state)
-    local = np.array([n, e, cross(n, e)]) @ at.rotation
+    local = np.array([*quarter(e, cross(n, e)), n]) @ at.rotation
+    ring = Face(thing, at.actInv(center), local, np.full(2, radius))
     thick = 0.5 * (_support(shapes, n) + _support(shapes, -n))
-    # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
-    return Face(thing, at.actInv(center + radius * e), local, np.array([thick, thick, 0.25 * radius]))
+    return Rim(ring, place, radius, np.array([thick, thick, radius]))
 
 
 class Crossing(NamedTuple):
@@ -86,7 +130,7 @@ class Crossing(NamedTuple):
     """
 
     place: Place  # the palm
-    bar: Face  # the bar
+    bar: Face | Rim  # the bar
     low: float  # where along it the palm may be, from its middle [m]
     high: float
     across: float = 0.0  # largest x . w, either way [m]
@@ -112,7 +156,7 @@ class Ahead(NamedTuple):
     """A bar's axis at a distance from the palm, on the side where the palm looks: one row [m]."""
 
     place: Place  # the palm
-    bar: Face  # the bar
+    bar: Face | Rim  # the bar
     distance: float  # [m]
     in_radians: tuple[bool, ...] = (False,)
 
@@ -144,7 +188,7 @@ def opened(term: Any, distance: float) -> Any:
     return filled(term, parts=tuple(parts))
 
 
-def _beside(place: Place, bar: Face, axis: int, state: State) -> tuple[Array, Array]:
+def _beside(place: Place, bar: Face | Rim, axis: int, state: State) -> tuple[Array, Array]:
     """From the palm to a bar's middle along a palm's axis, across and along the bar, metres; derivatives (2, nv)."""
     center, axes = bar.at(state)
     frame, along = state.frame(place.frame), axes[2]
@@ -155,7 +199,7 @@ def _beside(place: Place, bar: Face, axis: int, state: State) -> tuple[Array, Ar
     # of the hand against the thing, seen from the thing: the hand's velocity v and rotation w
     wrench = through(palm, np.array([-level, -along]))
     wrench[0, 3:] += pin.skew(across_palm) @ (way - reach * along)
-    return np.array([level @ way, reach]), between(state, wrench, place.joint, bar.joint)
+    return np.array([level @ way, reach]), bar.rows(state, wrench, place.joint)
 
 
 class Looking(NamedTuple):

@@ -25,6 +25,7 @@ from wholebody.methods.starts import (
     Attempt,
     Minima,
     alike,
+    arms_ahead,
     crouched,
     hooked_hands,
     least_effort,
@@ -96,6 +97,9 @@ class QPMultistart(Search):
             return
         self._least = least
         if self.settings.measures and not self._proven():
+            # Hands come from ahead: those that come from below, led by what is met alone, end in poorer minima.
+            ahead = arms_ahead(self.problem, self.lineariser.state, self._start)
+            yield Attempt(self._before_contact(begin=[*ahead]), self.directly, "from before contact")
             yield Attempt([self._start], self._without_measures, "")
         elif not self._proven():
             yield from self._attempts_for_feasibility()
@@ -152,9 +156,8 @@ class QPMultistart(Search):
         found.contradictions, found._least = self.contradictions, self._least
         found._best = begin = found._ran(found._feasibility(found.lineariser, 0, ""), start)
         found.search(found._attempts_for_feasibility())
-        self.spent += found.spent
+        self.count(found)
         self.tried += found.tried
-        self.trace += found.trace
         self.out_of_reach, self._near = found.out_of_reach, found._near
         if found.best is begin and begin.violation.worst > self.settings.tolerance:
             return None
@@ -176,18 +179,17 @@ class QPMultistart(Search):
             self._in_contact.append(local.violation.total)
         return local
 
-    def _before_contact(self, grips: bool = False, begin: Sequence[Array] = ()) -> Iterator[Array]:
+    def _before_contact(self, grips: bool = False, begin: Sequence[Array] | None = None) -> Iterator[Array]:
         """Postures where surfaces are in front of the faces that they are to meet, or bars in front of palms."""
-        most = len(self.trace) + self._left
-        for local in before_contact(self.problem, self._shared, self.settings.seed, most, grips=grips, begin=begin):
+        given = self.problem, self._shared, self.settings.seed, len(self.trace) + self._left
+        for local in before_contact(*given, grips=grips, begin=begin):
             self.spent += local.iterations
             yield local.q
 
     def _closing(self, start: Array) -> LocalSolution | None:
         """Close hands around bars: from hooked fingers by relaxed probes, then, or without such hands, as they are."""
         for q in self._hooked(start):
-            local = self._relaxed(q)
-            if local is not None and self.accept(local, "from hooked hands"):
+            if (local := self._relaxed(q)) is not None and self.accept(local, "from hooked hands"):
                 return local
         return self.feasibility_first(start)
 
@@ -234,8 +236,7 @@ class QPMultistart(Search):
         local = search.directly(self._start)
         if local.violation.worst > tolerance:
             local = search.feasibility_first(self._start) or local
-        self.spent += search.spent
-        self.trace += search.trace
+        self.count(search)
         if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
             self.accept(self._descend(local.q))
         return self.best.measure < SEARCH.moved * before
@@ -336,8 +337,7 @@ class QPMultistart(Search):
         if self.control.over:
             return
         if self.out_of_reach:
-            local = self._ran(self._closest(), self.best.q)
-            self.accept(local)
+            self.accept(self._ran(self._closest(), self.best.q))
         if not held(self.best, tolerance):
             self.accept(self._stay(self.best))
         if self.problem.goals and not held(self.best, tolerance):
@@ -365,8 +365,7 @@ class QPMultistart(Search):
             alone.goals = ()
             search = QPMultistart(alone, self.lineariser.workspace, self.solver, settings, self.control)
             found = search.run()
-            self.spent += search.spent
-            self.trace += search.trace
+            self.count(search)
             for stage in (self._feasibility(self.lineariser, 0, ""), self._closest()):
                 self.accept(self._ran(stage, found.q))
 

@@ -51,6 +51,11 @@ class Search(Multistart[LocalSolution]):
         """The smaller of this number of programs and that of one descent."""
         return min(programs, self.settings.iterations)
 
+    def count(self, other: Search) -> None:
+        """Count what another search did for this one."""
+        self.spent += other.spent
+        self.trace += other.trace
+
     def directly(self, start: Array) -> LocalSolution:
         """A descent; without measures by whole steps as long as these gain much."""
         return self._ran(self._descent(self.settings.iterations, None, "", full_step=not self.settings.measures), start)

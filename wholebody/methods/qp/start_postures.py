@@ -37,11 +37,11 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 
 
 def before_contact(
-    problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False, begin: Sequence[Array] = ()
+    problem: Problem, shared: Run, seed: int, most: int, *, grips: bool = False, begin: Sequence[Array] | None = None
 ) -> Iterator[LocalSolution]:
     """Descents to surfaces in front of what they are to touch or, with `grips`, to bars in front of palms too.
 
-    They begin at `begin`, or else at the problem's start and others.
+    They begin at `begin`, or where that is not given at the problem's start and others.
     """
     terms, start = (*problem.goals, *problem.constraints), problem.scene.figure.clamp(problem.start)
     state = shared.lineariser.state.update(start)
@@ -78,7 +78,7 @@ def before_contact(
     others = restarts(problem, shared.lineariser.state, start, np.random.default_rng(seed), count - 1)
     ends, missed = list[float](), list[LocalSolution]()
     usual = chain(least_effort(problem, state), [start], [halfway(problem, state, start)] if sides else [], others)
-    for q in begin or usual:
+    for q in usual if begin is None else begin:
         local = led(q)
         # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
         if local.violation.worst <= 0.01:
