@@ -88,8 +88,8 @@ class Articulated:
         if self._rests(tracked, dt, moved, segments):
             return
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        # so often steps may be made again to end at an impact, or end early: what is squeezed meets thousands
-        now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
+        # so often steps may be made again to end at an impact: what is squeezed meets thousands
+        now, left, self._stops, self._soon = 0.0, dt, 12, SHORTEST
         self.impulses, self.frames, self.ends = {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
@@ -148,7 +148,7 @@ class Articulated:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
-        most = STEP if self._turning * time > FAR else time
+        most, again = STEP if self._turning * time > FAR else time, False
         while True:
             done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
@@ -159,7 +159,10 @@ class Articulated:
             elif (met or sunk or (far and back is None)) and done > SHORTEST and self._stops > 0:
                 # what is squeezed meets it again and again
                 self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
-                most = max(SHORTEST, min(0.98 * min(met, default=done), 0.7 * done, 0.14 * done / max(angle, 0.14)))
+                # the next step begins with the impact; one that comes earlier in a shorter step is not waited for
+                shorter = 0.7 * done if sunk or again or not met else done
+                until = min(min(met, default=done) - 0.5 * SHORTEST, shorter, 0.14 * done / max(angle, 0.14))
+                most, again = max(0.5 * SHORTEST, until), True
             else:
                 self.frames += [] if frame is None else [frame]
                 self._turning = angle / done
@@ -242,17 +245,17 @@ class Articulated:
     def _until_impact(self, points: Points, time: float) -> float:
         """The time to the first impact if that comes within a time."""
         speed = self._relative(points)[::3]
-        coming = (points.restitution * speed < -BOUNCE) & (points.gap > SHORTEST * -speed)
+        coming = (points.restitution * speed < -BOUNCE) & (points.gap - SKIN > self._soon * -speed)
         first = float(((points.gap[coming] - SKIN) / -speed[coming]).min(initial=time))
-        if first >= time or self._early <= 0:  # then impacts are part of the program, and do not bounce
+        if first >= time:
             return time
-        self._early -= 1
+        self._soon += SHORTEST  # of many impacts in a frame the later ones are taken together
         return max(first, SHORTEST)
 
     def _bounce(self, inertia: Array, points: Points) -> Array:
         speed = self._relative(points)
         approach = speed[::3]
-        hit = (points.restitution * approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
+        hit = (points.restitution * approach < -BOUNCE) & (points.gap - SKIN <= self._soon * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
         if not hit.any():
