@@ -36,7 +36,7 @@ from wholebody.figures.state import free_roots
 from wholebody.scene.scene import Scene
 
 CREEPS = 1e-4  # m/s, as `STILL`, of a figure that springs or dampers lead to where it is to stay
-LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
+LONGEST = 1.0 / 120.0  # s: of a step; with bodies near a fast figure it is the engine's
 FAR = 0.15  # rad: gaps are not linear in a step that turns a piece by more
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 
@@ -181,10 +181,10 @@ class Articulated:
         points = self._touching.points(self.q, start, planned, moved)
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
-        time = self._until_impact(points, min(time, STEP) if points.bodies else time)
+        fast = bool(points.bodies) and self._touching.fastest(self.q, start) > 2.0  # m/s
+        time = self._until_impact(points, min(time, STEP) if fast else time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
-        near = np.asarray(points.figure.any(axis=0))
-        share = Springs.shares(self.stiffness, self.damping, masses_begun.diagonal(), time, near)
+        share = Springs.shares(self.stiffness, self.damping, masses_begun.diagonal(), time, points.figure)
         springs = Springs(self.stiffness, self.damping, apart, steady, share)
         driven, self.velocity, mean, borne = free_motion(model, self._data, self._inertia, self.q, begin, time, springs)
         points, bearing, parting = self._bear(driven, points, time)

@@ -26,10 +26,10 @@ class Springs(NamedTuple):
     share: Array
 
     @staticmethod
-    def shares(stiffness: Array, damping: Array, inertia: Array, time: float, near: Mask) -> Array:
-        """Shares of a step of freedoms that move inertias (nv,), and of which some move what is near (nv,)."""
+    def shares(stiffness: Array, damping: Array, inertia: Array, time: float, near: Array) -> Array:
+        """Shares of a step of freedoms that move inertias (nv,), and what is near along rows (k, nv)."""
         soft = np.maximum(time * (damping + time * stiffness) / inertia, 1e-9)
-        return np.where(near, 1.0, np.maximum(0.5, 1.0 - 1.0 / soft))
+        return np.where(near.any(axis=0), 1.0, np.maximum(0.5, 1.0 - 1.0 / soft))
 
     def taken(self, begin: Array, end: Array) -> Array:
         """The velocity (nv,) at the share of a step."""
