@@ -8,6 +8,7 @@ import pytest
 
 from tests.csv_rows import csv_rows
 from wholebody.cli import main
+from wholebody.dynamics.live_world import LiveWorld
 from wholebody.dynamics.world import WORLD_SCENES, build_world_scene
 from wholebody.taskfile.task import View
 
@@ -61,6 +62,26 @@ def test_a_body_of_a_task_file_has_a_mass_or_a_density(tmp_path: Path, capsys: p
     task.write_text(TASK.format(body="mass = 2.0\ndensity = 300.0"))
     assert main(["world", str(task), "--out", str(out)]) == 2
     assert "give one of them" in capsys.readouterr().err
+
+
+def test_a_room_in_which_nothing_moves_by_itself_is_for_the_live_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task, out, served = tmp_path / "room.toml", tmp_path / "out", []
+
+    class Page:
+        def __init__(self, live: LiveWorld, *_: object, **__: object) -> None:
+            self.live, self.url = live, ""
+
+        def serve(self) -> None:
+            served.append(self.live.move())
+
+    monkeypatch.setattr("wholebody.cli.world.LivePage", Page)
+    task.write_text(TASK.format(body=""))
+    assert main(["world", str(task), "--out", str(out)]) == 2
+    assert "give an object a density or a mass, or add --live" in capsys.readouterr().err
+    assert main(["world", str(task), "--live", "--out", str(out)]) == 0
+    assert [frame.overlap for frame in served] == [0.0]
 
 
 def test_a_live_page_has_the_camera_of_the_scene_or_the_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ def test_a_step_at_axes_that_nearly_align_makes_no_energy() -> None:
     model = pin.Model(figure.model)
     model.gravity.linear = np.zeros(3)  # so that kinetic energy is conserved
     data, none, most, aligned = model.createData(), np.zeros(model.nv), 0.0, 0
-    springs = Springs(none, none, none, none)
+    springs = Springs(none, none, none, none, none + 0.5)
 
     def inertia(q: np.ndarray) -> np.ndarray:
         return np.array(pin.crba(model, data, q))

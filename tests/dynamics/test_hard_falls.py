@@ -52,6 +52,15 @@ def test_a_box_that_limbs_squeeze_does_not_make_a_frame_endless() -> None:
     assert steps < 200  # 644
 
 
+def test_many_impacts_of_a_frame_are_taken_together() -> None:
+    world, ends = falling("avatar", 4, True), 0
+    for _ in range(70):
+        world.step()
+        assert world._articulated is not None
+        ends = max(ends, len(world._articulated.ends))
+    assert ends < 11  # 16 where each of them ended a step; each step is a program of all contacts
+
+
 @pytest.mark.parametrize("speed", [5.0, 30.0, 60.0])
 def test_no_step_turns_a_limb_so_far_that_it_ends_in_what_it_meets(tmp_path: Path, speed: float) -> None:
     """Gaps are linear in a step: of a rod of 1 m that turns by 0.15 rad they are off by 0.15**2 / 2 = 11 mm at most."""

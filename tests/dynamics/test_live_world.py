@@ -102,6 +102,23 @@ def test_what_a_lost_tracker_left_is_free_again_when_it_is_back_and_a_sole_is_he
     assert np.linalg.norm(live.place("left_palm") - hand) > 0.02  # it goes with the body
 
 
+def test_a_lost_head_is_not_drawn_back_from_hands_that_walk_away() -> None:
+    live = LiveWorld(wb.Scene(wb.load("avatar")))
+    for sole in ("left_sole", "right_sole"):
+        live.toggle(sole)
+    home = {name: live.place(name) for name in ("left_palm", "right_palm", "head_top")}
+    for number in range(150):
+        way = np.array([0.01 * number, 0.0, 0.0])
+        live.follow({name: place + way for name, place in home.items() if number < 30 or name != "head_top"})
+        live.move()
+    for name in ("left_palm", "right_palm"):
+        assert live.place(name) == pytest.approx(home[name] + way, abs=0.02)  # they lagged by a metre
+    assert live.place("head_top")[0] - home["head_top"][0] > 0.5 * way[0]
+    assert "no place of head_top arrives any more; it is free" in live.report().status
+    live.follow({"head_top": home["head_top"] + way})
+    assert "arrives" not in live.report().status
+
+
 def test_a_tracker_that_comes_back_from_far_away_is_followed_at_once() -> None:
     live = LiveWorld(wb.Scene(wb.load("avatar")))
     began = live.place("left_palm")

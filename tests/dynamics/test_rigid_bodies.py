@@ -175,3 +175,15 @@ def test_what_is_taken_back_leaves_nothing_behind(hand: wb.Figure) -> None:
     twice = engine.advance(1 / 30)
     assert len(once.events) == len(twice.events) > 0
     np.testing.assert_allclose(engine.placement("still").homogeneous, ended.homogeneous, atol=1e-9)
+
+
+@pytest.mark.parametrize("dt", [1.0 / 240.0, 1.0 / 120.0, 1.0 / 60.0])
+def test_a_body_that_a_push_bears_stays_where_it_is_however_many_steps_a_frame_has(dt: float) -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0), body=wb.Body(mass=2.0))
+    scene.add(wb.Box((0.5, 0.5, 0.1)), name="lid", at=(1.0, 0.0, 0.1502))  # it rose to it by a part of the push
+    engine = RigidBodies(scene)
+    for _ in range(30):
+        engine.push("ball", -dt * engine.weight("ball"), engine.centre("ball"))
+        frame = engine.advance(dt, borne={"ball"})
+        assert not frame.impulses
+        assert engine.placement("ball").translation == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)

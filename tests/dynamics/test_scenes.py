@@ -7,9 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-import wholebody as wb
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_world_scene, standing_scene
+from wholebody.dynamics.world import WORLD_SCENES, World, WorldFrame, build_world_scene
 
 SHARES = {"bag": 0.35, "flick": 0.8, "push_box": 0.4, "stairs": 0.15}
 """Of the frames of a scene, those in which what is to happen happens."""
@@ -68,9 +67,3 @@ def test_scenes_are_named_and_unknown_ones_are_not_built() -> None:
         build_world_scene("flik")
     with pytest.raises(InputError):
         build_world_scene("flick", frames=0)
-
-
-def test_a_scene_of_ones_own_needs_something_that_moves() -> None:
-    scene = wb.Scene(wb.load("hand")).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="density"):
-        standing_scene("mine", scene, scene.figure.neutral, frames=5)

@@ -318,3 +318,12 @@ def test_a_figure_without_pieces_touches_nothing(tmp_path: Path, yields: bool) -
         world.step()
     fallen = 0.3 - 0.5 * 9.81 * world.time**2
     assert scene.objects["ball"].placement.translation == pytest.approx((0.0, 0.0, fallen), abs=1e-9)
+
+
+def test_what_falls_out_of_the_world_falls_on_without_a_word(recwarn: pytest.WarningsRecorder) -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.Sphere(0.1), name="ball", at=(2.0, 0.0, 0.0), body=wb.Body(mass=1.0))
+    world = wb.World(scene, dt=0.1)
+    for _ in range(60):
+        frame = world.step()
+    assert frame.placements["ball"].translation[2] == pytest.approx(-0.5 * 9.81 * 6.0**2)
+    assert not [one for one in recwarn if issubclass(one.category, UserWarning)]  # each frame beyond 100 m had one

@@ -83,6 +83,11 @@ def _scene(name: str, arguments: argparse.Namespace) -> InteractionScene:
     """The scene of a name, or that of a task file, whose figure stands as the file starts."""
     if name.endswith(".toml"):
         task = read_task(name)
+        still = all(thing.body is None for thing in task.problem.scene.objects.values())
+        if still and not arguments.live:  # on the page the figure and what stands are dragged
+            raise InputError(
+                f"{title_of(name)}: nothing moves by itself; give an object a density or a mass, or add --live"
+            )
         # frames of a task file
         scene = standing_scene(title_of(name), task.problem.scene, task.problem.start, frames=arguments.frames or 180)
         return replace(scene, eye=task.view.eye, target=task.view.target, see_through=task.view.see_through)

@@ -4,13 +4,14 @@ With the inertia M of the joints, springs K and dampers R towards a tracker, a s
 
     (M + h R + h^2 K) v+ = M v + h (K e - c) + (h R + h^2 K) v_tracked + J^T p,
 
-e from the figure to the tracker, c the forces of motion and weight. The springs are implicit, so any are stable. The
-impulses p are equation 9 of Schmidl and Lin with the whole articulated body in it, J M^-1 J^T in place of its mass and
-inertia: what is hit anywhere moves all joints. All contacts of the figure, and of what touches it with other things,
-have one program. Impacts come first, without forces; a step ends where the next begins.
-M and c are those half way (midpoint rule); joints without springs, in a step without contacts, move by the mean of v
-and v+. A root without spring and damper ends a step with the momentum that impulses and weight gave what it carries;
-the velocities beside that are scaled so that energy is conserved where nothing drives or touches the figure.
+e from the figure to the tracker, c the forces of motion and weight: implicit springs, of which any are stable. Those
+that are soft, and move nothing that is near, have their forces half way (`free_motion`). The impulses p are equation 9
+of Schmidl and Lin with the whole articulated body in it, J M^-1 J^T in place of its mass and inertia: what is hit
+anywhere moves all joints. All contacts of the figure, and of what touches it with other things, have one program.
+Impacts come first, without forces; a step ends where the next begins. M and c are those half way (midpoint rule);
+joints without springs, in a step without contacts, move by the mean of v and v+. A root without spring and damper
+ends a step with the momentum that impulses and weight gave what it carries; the velocities beside that are scaled so
+that energy is conserved where nothing drives or touches the figure.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, cross
+from wholebody.base.arrays import Array, Indices, cross, with_values
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
 from wholebody.dynamics.blows import BOUNCE, left_for_later
@@ -35,7 +36,7 @@ from wholebody.figures.state import free_roots
 from wholebody.scene.scene import Scene
 
 CREEPS = 1e-4  # m/s, as `STILL`, of a figure that springs or dampers lead to where it is to stay
-LONGEST = 1.0 / 120.0  # s: of a step in which no body is near the figure; else it is the engine's
+LONGEST = 1.0 / 120.0  # s: of a step; with bodies near a fast figure it is the engine's
 FAR = 0.15  # rad: gaps are not linear in a step that turns a piece by more
 SHORTEST = 2e-4  # s: steps do not end earlier at an impact
 
@@ -88,8 +89,8 @@ class Articulated:
         if self._rests(tracked, dt, moved, segments):
             return
         steady = pin.difference(self._model, self._tracked, tracked) / dt
-        # so often steps may be made again to end at an impact, or end early: what is squeezed meets thousands
-        now, left, self._stops, self._early = 0.0, dt, 12, int(24.0 * max(1.0, 60.0 * dt))
+        # so often steps may be made again to end at an impact: what is squeezed meets thousands
+        now, left, self._stops, self._soon = 0.0, dt, 12, SHORTEST
         self.impulses, self.frames, self.ends = {}, [], []
         while left > TIME_STEP[0]:  # less is no step of the engine
             shares = (now / dt, min(1.0, (now + min(left, LONGEST)) / dt))
@@ -148,7 +149,7 @@ class Articulated:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
-        most = STEP if self._turning * time > FAR else time
+        most, again = STEP if self._turning * time > FAR else time, False
         while True:
             done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
@@ -159,7 +160,10 @@ class Articulated:
             elif (met or sunk or (far and back is None)) and done > SHORTEST and self._stops > 0:
                 # what is squeezed meets it again and again
                 self._stops = 0 if frame is not None and frame.deepest > 1e-4 else self._stops - 1
-                most = max(SHORTEST, min(0.98 * min(met, default=done), 0.7 * done, 0.14 * done / max(angle, 0.14)))
+                # the next step begins with the impact; one that comes earlier in a shorter step is not waited for
+                shorter = 0.7 * done if sunk or again or not met else done
+                until = min(min(met, default=done) - 0.5 * SHORTEST, shorter, 0.14 * done / max(angle, 0.14))
+                most, again = max(0.5 * SHORTEST, until), True
             else:
                 self.frames += [] if frame is None else [frame]
                 self._turning = angle / done
@@ -177,9 +181,11 @@ class Articulated:
         points = self._touching.points(self.q, start, planned, moved)
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
-        time = self._until_impact(points, min(time, STEP) if points.bodies else time)
+        fast = bool(points.bodies) and self._touching.fastest(self.q, start) > 2.0  # m/s
+        time = self._until_impact(points, min(time, STEP) if fast else time)
         begin, apart = self.velocity, np.asarray(pin.difference(model, self.q, aim))
-        springs = Springs(self.stiffness, self.damping, apart, steady)
+        share = Springs.shares(self.stiffness, self.damping, masses_begun.diagonal(), time, points.figure)
+        springs = Springs(self.stiffness, self.damping, apart, steady, share)
         driven, self.velocity, mean, borne = free_motion(model, self._data, self._inertia, self.q, begin, time, springs)
         points, bearing, parting = self._bear(driven, points, time)
         self._beside = points.bodies
@@ -191,16 +197,19 @@ class Articulated:
             drift(self._data, root, momentum[model.idx_vs[root] :][:6], self._gravity, time, pressed)
             for root in self._roots
         ]
-        motor = self.stiffness * (apart + time * (steady - after)) + self.damping * (steady - after) + borne
-        # springs and contacts are implicit; what is free of them moves by the mean of both velocities
-        moves = time * np.where((self.stiffness > 0.0) | pressed, after, mean)
-        moves *= points.share(moves)  # what a program that is not solved leaves
+        springs = with_values(springs, share=np.where(points.figure.any(axis=0), 1.0, share))  # of far limits too
+        way = np.where((self.stiffness > 0.0) | pressed, springs.taken(begin, after), mean)
+        way *= points.share(time * way)  # what a program that is not solved leaves
+        motor, moves = springs.forces(time, way) + borne, time * way
         first, last = points.figure @ (0.5 * (start + begin)), points.figure @ after
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # what parts an overlap has its energy from nowhere
         work -= np.maximum(0.0, (bearing * parting.reshape(-1, 3)).sum(axis=1))
         paid = float(motor @ moves + work[points.driven].sum())
-        self._move(moves, drifted, np.inf if self.stiffness.any() else began + paid)
+        rise = self._move(moves, drifted, np.inf if self.stiffness.any() else began + paid)
+        if self._driven:
+            paid -= springs.excess(time, way, pin.difference(model, self.q, pin.integrate(model, aim, time * steady)))
+            paid += rise - float(borne @ moves) if self.stiffness.all() else 0.0  # all the weight is borne
         stands = self._touching.joints(self.q)
         self._turned = self._touching.turned(stood, stands)
         motions = {name: (way[0], pin.SE3.Interpolate(*way, time / planned)) for name, way in moved.items()}
@@ -242,17 +251,15 @@ class Articulated:
     def _until_impact(self, points: Points, time: float) -> float:
         """The time to the first impact if that comes within a time."""
         speed = self._relative(points)[::3]
-        coming = (points.restitution * speed < -BOUNCE) & (points.gap > SHORTEST * -speed)
+        coming = (points.restitution * speed < -BOUNCE) & (points.gap - SKIN > self._soon * -speed)
         first = float(((points.gap[coming] - SKIN) / -speed[coming]).min(initial=time))
-        if first >= time or self._early <= 0:  # then impacts are part of the program, and do not bounce
-            return time
-        self._early -= 1
-        return max(first, SHORTEST)
+        self._soon += SHORTEST if first < time else 0.0  # of many impacts in a frame the later ones are taken together
+        return min(max(first, SHORTEST), time)
 
     def _bounce(self, inertia: Array, points: Points) -> Array:
         speed = self._relative(points)
         approach = speed[::3]
-        hit = (points.restitution * approach < -BOUNCE) & (points.gap - SKIN <= SHORTEST * np.abs(approach))
+        hit = (points.restitution * approach < -BOUNCE) & (points.gap - SKIN <= self._soon * np.abs(approach))
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
         if not hit.any():
@@ -327,8 +334,8 @@ class Articulated:
                 self._engine.push_about_centre(name, wrench)  # type: ignore[union-attr]
                 self.impulses[name] = self.impulses.get(name, np.zeros(3)) + wrench[:3]
 
-    def _move(self, way: Array, drifted: Sequence[tuple[pin.Force, Array]], energy: float) -> None:
-        """Move the joints by a way (nv,), and nothing above a potential energy [J]."""
+    def _move(self, way: Array, drifted: Sequence[tuple[pin.Force, Array]], energy: float) -> float:
+        """Move the joints by a way (nv,), and nothing above a potential energy [J]; by how much it rises."""
         model, data = self._model, self._data
         start, lowest = self.q, self._potential()
         self.q = np.array(pin.integrate(model, start, way))
@@ -339,7 +346,8 @@ class Articulated:
         rise, most = self._potential() - lowest, max(0.0, energy - lowest)
         if rise > most:  # of so little, the rise is nearly proportional to the way
             part = 0.99 * most / rise * pin.difference(model, start, self.q)
-            self.q = np.array(pin.integrate(model, start, part))
+            self.q, rise = np.array(pin.integrate(model, start, part)), most
+        return rise
 
     def _carried(self, segments: Mapping[str, int], before: Array, after: Array) -> Given:
         """The motions of segments whose joints are at placements (joints, 4, 3) before and after."""

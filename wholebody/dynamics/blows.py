@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array, cross
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.rigid_bodies import RigidBodies
 
-BOUNCE = 0.05  # m/s: slower rebounds, of up to 0.13 mm, are left out
+BOUNCE = 0.1  # m/s: slower rebounds, of up to 0.5 mm, are left out
 
 
 def left_for_later(

@@ -13,12 +13,43 @@ from wholebody.dynamics.impulse_kernel import by_inertia
 
 
 class Springs(NamedTuple):
-    """Springs and dampers (nv,) towards a tracked posture, the way there, and its velocity."""
+    """Springs and dampers (nv,) towards a tracked posture, the way there, and its velocity.
+
+    Their forces are those at a share of a step (nv,): half way they do the work of the step, and its end is safe where
+    contacts press, or where they are so stiff that half way would turn the velocity round.
+    """
 
     stiffness: Array
     damping: Array
     apart: Array
     steady: Array
+    share: Array
+
+    @staticmethod
+    def shares(stiffness: Array, damping: Array, inertia: Array, time: float, near: Array) -> Array:
+        """Shares of a step of freedoms that move inertias (nv,), and what is near along rows (k, nv)."""
+        soft = np.maximum(time * (damping + time * stiffness) / inertia, 1e-9)
+        return np.where(near.any(axis=0), 1.0, np.maximum(0.5, 1.0 - 1.0 / soft))
+
+    def taken(self, begin: Array, end: Array) -> Array:
+        """The velocity (nv,) at the share of a step."""
+        return np.asarray(begin + self.share * (end - begin))
+
+    def forces(self, time: float, velocity: Array) -> Array:
+        """Forces (nv,) at the share of a step that moves with a velocity (nv,)."""
+        return self._pull(time, velocity) + self.damping * (self.steady - velocity)
+
+    def excess(self, time: float, velocity: Array, left: Array) -> float:
+        """Work of the springs beyond what they had stored and the tracker gave, J; `left` (nv,) is the way at the end.
+
+        Turns of a root are no vectors, so along one the springs do not quite do the work that they store.
+        """
+        pull = self._pull(time, velocity)
+        stored = 0.5 * float(self.stiffness @ (self.apart**2 - left**2)) + time * float(pull @ self.steady)
+        return max(0.0, time * float(pull @ velocity) - stored)
+
+    def _pull(self, time: float, velocity: Array) -> Array:
+        return self.stiffness * (self.apart + self.share * time * (self.steady - velocity))
 
 
 class FreeMotion(NamedTuple):
@@ -45,7 +76,7 @@ def free_motion(
     thousand times the energy. A step whose kinetic energy would be more than twice what is there and what the forces
     do has weight and springs alone, with the inertia at its start.
     """
-    soft = time * springs.damping + time * time * springs.stiffness
+    soft = time * springs.damping + time * time * springs.share * springs.stiffness
     there = 0.5 * float(begin @ inertia(q) @ begin)
 
     def ended(middle: Array, mean: Array) -> tuple[FreeMotion, float]:
@@ -53,9 +84,10 @@ def free_motion(
         weight = np.asarray(pin.computeGeneralizedGravity(model, data, middle)).copy()
         forces = np.asarray(pin.nonLinearEffects(model, data, middle, mean)).copy()
         masses, borne = inertia(middle), np.where(springs.stiffness > 0.0, weight, 0.0)
-        driven = masses + np.diag(soft)
+        driven = masses + np.diag(springs.share * soft)
         pull = springs.stiffness * springs.apart - forces + borne
-        velocity = by_inertia(driven, masses @ begin + time * pull + soft * springs.steady)
+        lead = soft * (springs.steady - (1.0 - springs.share) * begin)
+        velocity = by_inertia(driven, masses @ begin + time * pull + lead)
         half = 0.5 * (begin + velocity)
         kinetic = 0.5 * float(velocity @ masses @ velocity)
         done = kinetic - 0.5 * float(begin @ masses @ begin) + time * float(half @ (forces - weight))

@@ -113,7 +113,7 @@ class LiveWorld:
     def follow(self, places: Mapping[str, ArrayLike]) -> None:
         """Handles are to follow places (3,) [m] from outside, such as a tracked head and hands, from the next frame on.
 
-        One that is not renewed within 0.25 s stays, and after it eases back to where it began. There it is let go.
+        One that is not renewed within 0.25 s is let go; where all are lost, they first ease back to where they began.
 
         Raises:
             InputError: a place is not three finite numbers.
@@ -175,8 +175,9 @@ class LiveWorld:
         doing = (
             f"dragging {self.taken}" if self.taken else "drag a handle or a thing; click a handle to hold or release it"
         )
-        lost = ", ".join(name for name in list(self._renewed) if self._lost(name))
-        notes = [self._note, f"no place of {lost} arrives any more; it eases back" if lost else ""]
+        lost, known_ones = [name for name in list(self._renewed) if self._lost(name)], len(self._renewed)
+        ends = "eases back" if len(lost) == known_ones else "is free"
+        notes = [self._note, f"no place of {', '.join(lost)} arrives any more; it {ends}" if lost else ""]
         said = "; ".join(filter(None, notes))
         return f"{doing}: {said}" if said and self.taken else said or doing
 
@@ -226,10 +227,15 @@ class LiveWorld:
         engine.push(name, dt * (mass * drawn - engine.weight(name)), engine.centre(name))
 
     def _ease(self) -> None:
-        """Bring handles back that a tracker has lost, and let them go when they are there."""
+        """Let go of handles that a tracker has lost, where others lead the figure; else bring them back first."""
         lost, away = [name for name in list(self._renewed) if self._lost(name)], 0.0
+        if len(lost) < len(self._renewed):  # where a lost one began is far from a figure that walked away
+            for name in self._goals.keys() & lost:
+                self._goals.pop(name, None)
+                self._tracker = None
+            return
         share = min(1.0, self.world.dt / 0.3)  # it eases back to where its handle began, in about a second
-        for name in lost:
+        for name in self._goals.keys() & lost:
             self._goals[name] = self._goals[name] + share * (self._places[name] - self._goals[name])
             there = self._handle_place(self._tracked, name) - self._places[name]
             away = max(away, float(np.linalg.norm(there)))

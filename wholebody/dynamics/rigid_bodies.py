@@ -223,7 +223,7 @@ class RigidBodies:
         for number in range(count):
             end = dt * (number + 1) / count
             while end - record.time > 1e-9 * dt and not (until < np.inf and record.met(yielding, until)):
-                self._step(end - record.time, record)
+                self._step(end - record.time, record, dt - record.time)
         state.stop(given, placed[:, 1])
         state.bodies.given[:] = False
         self._sleepers.update(self._near, dt)
@@ -254,12 +254,12 @@ class RigidBodies:
 
         return back
 
-    def _step(self, time: float, record: FrameRecord) -> None:
-        """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
+    def _step(self, time: float, record: FrameRecord, left: float) -> None:
+        """Advance by at most a time of the `left` s of a frame, to its end, an impact, or where a short step leads."""
         state = self.state
         if self._sleepers.wake(self._near):
             self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
-        planned, ahead = time, np.outer(time * (self._borne & state.bodies.moving), [*self.gravity, 0.0, 0.0, 0.0])
+        ahead = np.outer(left * (self._borne & state.bodies.moving), [*self.gravity, 0.0, 0.0, 0.0])
         points = self._finder.points(self._near)
         program = StepProgram(state, points, self.gravity, self._joints, self._yielding, ahead)
         events, ended = program.resolve_impacts()
@@ -301,7 +301,7 @@ class RigidBodies:
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
-        state.bodies.twist[:] -= (1.0 - time / planned) * ahead  # what the rest of it will add
+        state.bodies.twist[:] -= (1.0 - time / left) * ahead  # what the rest of it will add
         by = np.flatnonzero(impulse.any(axis=1) & state.bodies.given[program.points.bodies].any(axis=1))
         record.given += self._events(program, record.time, by, np.zeros(len(by)), impulse[by])
         wrench = np.hstack([impulse, cross(program.points.point, impulse)])

@@ -10,9 +10,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Moved, Points, approaches
-from wholebody.dynamics.pieces import Surfaces, places
+from wholebody.dynamics.pieces import Surfaces, needed, places
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.step_program import SKIN
+from wholebody.dynamics.step_program import SKIN, TOUCH
 from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.geometry.flesh import flesh_of
 from wholebody.scene.scene import Scene
@@ -54,10 +54,12 @@ class Touching:
         most = 2e-3 + np.minimum(0.2, time * (1.5 * speed + 0.5 * min(float(speed.max(initial=0.0)), 10.0)))
         near = workspace.proximity.query(workspace.state.data, float(most.max(initial=0.0)), most)
         rows = self._rows.rows(near)
-        kept = np.flatnonzero((rows.first > 0) | (rows.second > 0))
-        contact, wrench, sides = rows.contact[kept], rows.wrench[kept], np.stack([rows.first, rows.second], axis=1)
-        normal, place = np.ascontiguousarray(wrench[:, :3]), places(wrench, near, contact)
-        owner, gap, pair = self._owners[near.pair[contact]], rows.gap[kept], near.number[contact]
+        normal, place = np.ascontiguousarray(rows.wrench[:, :3]), places(rows.wrench, near, rows.contact)
+        own = (rows.first > 0) | (rows.second > 0)
+        kept = np.flatnonzero(own & needed(rows.contact, len(near.distance), normal, place, rows.gap, TOUCH))
+        contact, sides = rows.contact[kept], np.stack([rows.first[kept], rows.second[kept]], axis=1)
+        normal, place, gap = normal[kept], place[kept], rows.gap[kept]
+        owner, pair = self._owners[near.pair[contact]], near.number[contact]
         if engine is not None and (touched := np.unique(owner[owner < free])).size:
             others = engine.contacts([self._names[k] for k in touched.tolist()])
             owner, gap = np.concatenate([owner, others.bodies]), np.concatenate([gap, np.maximum(others.gap, SKIN)])
@@ -73,7 +75,7 @@ class Touching:
         centres = np.zeros((0, 3)) if engine is None else engine.state.bodies.position[bodies]
         state = workspace.state
         impulse_kernel.point_rows(
-            (normal, place, owner), (sides[kept], state.support, np.ascontiguousarray(state.jacobian)),
+            (normal, place, owner), (sides, state.support, np.ascontiguousarray(state.jacobian)),
             (slot, centres, twists), (made.axes, made.figure, made.things, made.given, made.driven),
         )  # fmt: skip
         made.add_flesh(state, workspace.geometry, self._flesh, near.pair[contact])

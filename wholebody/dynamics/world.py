@@ -317,7 +317,5 @@ build_world_scene = _FILE.build
 def standing_scene(name: str, scene: Scene, q: Array, *, frames: int) -> InteractionScene:
     """A scene of one's own, in which the figure keeps the posture q (nq,) for a number of frames."""
     frames = whole(frames, "frames", 1, MOST_FRAMES)
-    if not any(thing.body is not None for thing in scene.objects.values()):
-        raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")
     track = Clip(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), FRAME, name)
     return InteractionScene(name, "things move around a figure that stands", scene, track)

@@ -256,7 +256,8 @@ class SceneContents(checks.FixedAttributes):
         seconds = None if over is None else checks.time_step(over, f"move {checks.shown(name)}: over")
         with self._lock:
             thing = self._object(name)
-            _warn_of_units(name, place)
+            if thing.body is None:  # what falls in a world may be anywhere
+                _warn_of_units(name, place)
             motion = None if seconds is None else Motion(thing.placement, seconds)
             self._objects[name] = replace(thing, placement=place, motion=motion)
             if self._built is not None:

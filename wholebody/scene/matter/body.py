@@ -106,9 +106,10 @@ def surface(first: Material, second: Material) -> Surface:
     found = first.against.get(second.name, second.against.get(first.name))
     found = found or first.others or second.others
     if found is None:
+        own = second.name if first.name in MATERIALS else first.name  # those of table 1 are not the user's
         raise InputError(
             f"neither material {first.name!r} nor {second.name!r} says how they touch each other; give for example "
-            f"wb.dynamics.Material({first.name!r}, {{{second.name!r}: (0.3, 0.3)}})"
+            f"wb.dynamics.Material({own!r}, others=(0.3, 0.3)), restitution and friction"
         )
     return Surface(*found)
 
