@@ -39,7 +39,7 @@ TOGETHER = (
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
-        "wholebody.motion.trajectory.banded_kernel",
+        "wholebody.motion.trajectory.interior_point",
         "wholebody.planning.multiplier_kernel",
         "wholebody.planning.projection_kernel",
     ),
