@@ -11,8 +11,9 @@ import qpsolvers
 import scipy.sparse as sp
 
 from wholebody.motion.trajectory import interior_point
+from wholebody.motion.trajectory.banded_kernel import add_rows
 from wholebody.motion.trajectory.deviations import Objective
-from wholebody.motion.trajectory.interior_point import Answer, BandedQP, add_rows
+from wholebody.motion.trajectory.interior_point import Answer, BandedQP
 
 FRAMES, DOFS = 10, 3
 PRICE = 1e3

@@ -21,29 +21,7 @@ from scipy.linalg import lapack
 from scipy.sparse import csgraph
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.compiled import compiled, with_loops
-
-
-@compiled(fastmath=True)
-def add_rows(band: Array, first: Indices, begins: Indices, values: Array, weights: Array) -> None:
-    """Add the sum over rows r of w_r a_r a_r' to a symmetric band matrix."""
-    # `band` (n, k): entry (j, i) is at row j + i, column j; `first` (m,) columns, `begins` (m + 1,) into `values`.
-    for row in range(len(first)):
-        begin, end = begins[row], begins[row + 1]
-        for at in range(begin, end):
-            scaled = weights[row] * values[at]
-            if scaled != 0.0:
-                column = first[row] + at - begin
-                for to in range(at, end):
-                    band[column, to - at] += scaled * values[to]
-
-
-@with_loops(__name__)
-def compiled_kernel(_: Any) -> None:
-    """This module, with its loops compiled or loaded from the cache."""
-    none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
-    add_rows(np.zeros((1, 1)), places, np.zeros(1, dtype=np.intp), none, none)
-
+from wholebody.motion.trajectory.banded_kernel import add_rows
 
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
 LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one that has none opposite
