@@ -1,4 +1,9 @@
-"""A frame at a placement, at an orientation, or at a placement relative to another frame: goals, and a constraint."""
+"""A frame at a placement, at an orientation, or at a placement relative to another frame: goals, and a constraint.
+
+A spatial velocity V = (v, w) has its linear part at the world's origin, so a point p has the rows ``[I, -skew(p)]``.
+The rotation vector log3(R T') from a target T has the derivative Jlog3(R T')' w, in world axes (Chirikjian 2011,
+"Stochastic Models, Information Theory, and Lie Groups", vol. 2, section 10.6).
+"""
 
 from __future__ import annotations
 

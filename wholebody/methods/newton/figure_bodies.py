@@ -1,4 +1,4 @@
-"""A figure in full coordinates: its joints as equations, and conversion of postures to and from variables."""
+"""A figure in full coordinates: its joints as equations, postures to and from variables, displacements as rows."""
 
 from __future__ import annotations
 

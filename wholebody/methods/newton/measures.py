@@ -1,4 +1,7 @@
-"""The measures as rows whose squares are minimised, and the descent of the measures: docs/theory/newton.md."""
+"""The measures as rows whose squares are minimised, and their descent: docs/theory/newton.md.
+
+`Anderson` accelerates steps that form a linear sequence (Walker and Ni 2011, type II).
+"""
 
 from __future__ import annotations
 
