@@ -58,13 +58,12 @@ class Attraction:
 
     Attributes:
         parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
-        free: whether the wanted posture overlaps nothing: then a part may move away from it for a while.
         limit: of the work in the resolver's counts; beyond it joints are not tried one by one.
     """
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
         self._model, self._resolver = scene.model, resolver
-        self.limit, self.free = 0, False
+        self.limit = 0
         self._most = 0.03  # m: largest motion of a part's tip in one step; half of a forearm's width
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
@@ -106,7 +105,7 @@ class Attraction:
         slow = []
         for k, (dofs, _) in enumerate(self.parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN and not self.free:
+            if shares[k] and old - new < LEAST_GAIN:
                 back[dofs] = True
             if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
                 slow.append(k)
@@ -193,11 +192,9 @@ class FrameResolver:
         """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
         resolver, attraction = self._resolver, self._attraction
         before = resolver.placed
-        attraction.free = not resolver.query(wanted)
-        resolver.margin = (
-            5e-3 if attraction.free else MARGIN
-        )  # m: limbs that return to a free posture need room to turn
-        if attraction.free and not self._passes_through(before, q, wanted):
+        free = not resolver.query(wanted)
+        resolver.margin = 5e-3 if free else MARGIN  # m: limbs that return to a free posture need room to turn
+        if free and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
             if shown is not None:
                 return shown
@@ -211,17 +208,11 @@ class FrameResolver:
         """Steps from a free posture towards the wanted one; returns the postures."""
         resolver = self._resolver
         settled = [False] * len(self._parts)
-        settled[-1] = later = (
-            self._attraction.free
-        )  # limbs that are pressed against something leave it before the root moves
         way = []
         for _ in range(8):
             if resolver.counts.work > self._attraction.limit - OVERRUN:
                 break
             moved = self._attraction.step(q, wanted, settled)
-            if moved is None and later:
-                settled[-1] = later = False
-                moved = self._attraction.step(q, wanted, settled)
             if moved is None:
                 break
             for chain in resolver.chains.values():
