@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor import examination, packages
-from wholebody.doctor.examination import Outcome
-from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
+from wholebody.doctor import examination
+from wholebody.doctor.examination import EXTRAS, MODULES, Distribution, Outcome
 
 Fake = Callable[..., None]
 
@@ -21,7 +20,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
     def arrange(
         have: dict[str, Distribution] | None = None, fails: dict[str, str] | None = None, absent: Sequence[str] = ()
     ) -> None:
-        everything = {packages.normal(name): Distribution("1.0") for name in (*MODULES, *EXTRAS)} | (have or {})
+        everything = {examination.normal(name): Distribution("1.0") for name in (*MODULES, *EXTRAS)} | (have or {})
         for name in absent:
             del everything[name]
         failing = {MODULES.get(name, name): "ModuleNotFoundError: absent" for name in absent} | (fails or {})
@@ -29,7 +28,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
         def run(kind: str, names: Sequence[str]) -> dict[str, Outcome]:
             return {name: Outcome(name not in failing, failing.get(name, "fine")) for name in names}
 
-        monkeypatch.setattr(packages, "installed", lambda names: everything)
+        monkeypatch.setattr(examination, "installed", lambda names: everything)
         monkeypatch.setattr(examination, "run", run)
 
     return arrange

@@ -5,7 +5,7 @@ import re
 import sys
 from pathlib import Path
 
-from wholebody.doctor.packages import (
+from wholebody.doctor.examination import (
     EXTRAS,
     MODULES,
     Conflict,

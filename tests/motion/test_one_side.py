@@ -9,7 +9,7 @@ import numpy as np
 import wholebody as wb
 from tests.freeing import begun
 from wholebody.figures.figure import Figure
-from wholebody.motion.one_side import kept_beside
+from wholebody.motion.avoider import kept_beside
 from wholebody.motion.windows import Window
 
 DT = 1 / 30

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -92,3 +93,17 @@ def test_what_is_looked_at_from_afar_does_not_make_the_figure_small() -> None:
         problem = wb.Problem(scene, "standing", goals=[wb.Axis("gaze", (1, 0, 0), toward=looked_at)])
         (place,) = Goals(scene, problem).targets(scene.state(problem.start))
         np.testing.assert_allclose(place, eyes + (kept * 0.8, kept * 0.6, 0.0), atol=1e-9)
+
+
+def test_goals_are_drawn_where_they_are_resolved_without_the_warnings_of_stating_them() -> None:
+    scene = wb.Scene(wb.load("human"))
+    turned = (0.5, -0.2, 1.1, 1.0, 0.0, 0.0, 0.0)
+    with pytest.warns(UserWarning, match="half a turn about x"):
+        goals = [wb.Frame("right_palm", turned), wb.Relative("left_palm", "right_palm", turned)]
+    problem = wb.Problem(scene, goals=goals)
+    state = scene.state(problem.start)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        places = Goals(scene, problem).targets(state)
+    palm = scene.figure.placement(problem.start, "right_palm")
+    np.testing.assert_allclose(places, [turned[:3], palm.act(np.array(turned[:3]))], atol=1e-12)

@@ -35,7 +35,6 @@ TOGETHER = (
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.dynamics.impulse_kernel",
-        "wholebody.methods.ccd.guards_kernel",
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",

@@ -6,19 +6,140 @@ other. If it crashes, the present name caused the crash, and a new child process
 
 from __future__ import annotations
 
+import csv
 import os
+import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
+from importlib import import_module, metadata
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 from wholebody.base.runner import Child, EndedError
-from wholebody.doctor import packages
-from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 from wholebody.methods import EXTRAS as OF_METHODS
 from wholebody.methods import installed_methods
+
+with Path(__file__).with_name("packages.csv").open(encoding="utf-8", newline="") as _file:
+    _ROWS = list(csv.DictReader(_file))
+
+MODULES = {row["name"]: row["module"] for row in _ROWS if row["module"]}
+"""Required packages: distribution -> its module."""
+
+EXTRAS = {row["name"]: row["extra"] for row in _ROWS if row["extra"]}
+"""Optional packages: distribution -> the extra that installs it."""
+
+LIBRARIES = ("libpinocchio", "libcoal", "libhpp-fcl", "libeigenpy", "libboost_python", "liburdfdom", "libassimp")
+"""Shared libraries of which other versions break those of the wheels."""
+
+_EXACT = re.compile(r"^\s*(?P<name>[\w.-]+)\s*==\s*(?P<version>[\w.+!-]+)\s*$")
+
+
+class Distribution(NamedTuple):
+    """An installed distribution."""
+
+    version: str  # its version
+    requires: tuple[str, ...] = ()  # its requirements, as its metadata states them
+    files: frozenset[str] = frozenset()  # absolute paths of its files; empty if its metadata does not list them
+
+
+class Conflict(NamedTuple):
+    """Two incompatible packages."""
+
+    who: str  # the one with the requirement
+    needs: str  # its requirement, such as ``pin==3.8.0``
+    found: str | None  # the installed version; None if there is none
+
+    @property
+    def repair(self) -> str:
+        """The command that repairs it."""
+        return f"pip install '{self.needs}'" if self.who == "wholebody" else f"pip install '{self.who}' '{self.needs}'"
+
+    def __str__(self) -> str:
+        """Return one sentence."""
+        found = f"{self.found} is installed" if self.found else "it is not installed"
+        return f"{self.who} needs {self.needs}, and {found}"
+
+
+def normal(name: str) -> str:
+    """Spell a distribution's name as indexes do (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def installed(names: Iterable[str]) -> dict[str, Distribution]:
+    """The installed ones of the named distributions, and the distributions that they require in an exact version."""
+    found: dict[str, Distribution] = {}
+    left = [normal(name) for name in names]
+    seen = set(left)
+    while left:
+        name = left.pop()
+        try:
+            distribution = metadata.distribution(name)
+        except metadata.PackageNotFoundError:
+            continue
+        files = frozenset(os.path.realpath(str(file.locate())) for file in distribution.files or ())
+        found[name] = Distribution(distribution.version, tuple(distribution.requires or ()), files)
+        needed = {other for other, _ in exact_needs(found[name])} - seen
+        seen |= needed
+        left += needed
+    return found
+
+
+def exact_needs(distribution: Distribution) -> list[tuple[str, str]]:
+    """Requirements of the form ``name==version`` without a condition: (name, version)."""
+    matches = (_EXACT.match(requirement) for requirement in distribution.requires)
+    return [(normal(match["name"]), match["version"]) for match in matches if match]
+
+
+def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
+    """Exact versions that an installed package requires and that are not installed: pin, coal, placo are so built."""
+    found = []
+    for who, distribution in sorted(have.items()):
+        for name, version in exact_needs(distribution):
+            other = have.get(name)
+            if other is None or other.version != version:
+                found.append(Conflict(who, f"{name}=={version}", other.version if other else None))
+    return found
+
+
+def shadow(distribution: Distribution, file: str) -> str | None:
+    """Folder from which another package of the same name was imported, or None if the right one was imported."""
+    if not distribution.files or os.path.realpath(file) in distribution.files:
+        return None
+    return os.path.dirname(os.path.dirname(file))
+
+
+def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
+    """Say what is wrong with the interpreter's version, if anything."""
+    if (3, 10) <= version <= (3, 14):
+        return None
+    return f"Python {version[0]}.{version[1]} is not one of 3.10 to 3.14, for which the required packages exist"
+
+
+def shadowing_folders(environ: Mapping[str, str], modules: Iterable[str]) -> dict[str, list[str]]:
+    """Folders of PYTHONPATH, as after sourcing a workspace of ROS, with modules of these names: folder -> modules."""
+    found: dict[str, list[str]] = {}
+    for folder in _folders(environ, "PYTHONPATH"):
+        hidden = sorted({name for name in modules if (folder / name).is_dir() or (folder / f"{name}.py").is_file()})
+        if hidden:
+            found[str(folder)] = hidden
+    return found
+
+
+def loader_folders(environ: Mapping[str, str]) -> dict[str, list[str]]:
+    """Folders of LD_LIBRARY_PATH with libraries that would replace the wheels' own: folder -> libraries."""
+    found: dict[str, list[str]] = {}
+    for folder in _folders(environ, "LD_LIBRARY_PATH"):
+        hidden = [name for name in LIBRARIES if any(folder.glob(f"{name}*.so*"))]
+        if hidden:
+            found[str(folder)] = hidden
+    return found
+
+
+def _folders(environ: Mapping[str, str], variable: str) -> list[Path]:
+    return [Path(entry) for entry in environ.get(variable, "").split(os.pathsep) if entry and os.path.isdir(entry)]
+
 
 TIMEOUT = 300.0
 """Time limit of a check, seconds; a check takes one or two, more on a busy machine; the first compiles the loops."""
@@ -166,7 +287,7 @@ class Report:
 
 def examine(environ: Mapping[str, str] = os.environ) -> Report:
     """Examine everything; this takes about ten seconds, because methods and solvers are really used."""
-    have = packages.installed(["wholebody", *MODULES, *EXTRAS])
+    have = installed(["wholebody", *MODULES, *EXTRAS])
     entries = [*_packages(have), *_solvers(have), *_methods(), *_tools(), _cache()]
     faults = [*_faults(have, environ)]
     faults += [
@@ -180,7 +301,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
 def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
     outcomes = run("import", list(MODULES.values()))
     for name, module in MODULES.items():
-        found, outcome = have.get(packages.normal(name)), outcomes[module]
+        found, outcome = have.get(normal(name)), outcomes[module]
         if found is None and not outcome.works:
             yield Entry("package", name, "absent", "not installed", repair=AGAIN)
         elif not outcome.works:
@@ -188,7 +309,7 @@ def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
             yield Entry("package", name, "broken", f"{version}: import fails, {outcome.detail}", repair=AGAIN)
         elif found is None:
             yield Entry("package", name, "works", f"not from a package, {outcome.detail}")
-        elif (folder := packages.shadow(found, outcome.detail)) is not None:
+        elif (folder := shadow(found, outcome.detail)) is not None:
             detail = f"{found.version} is installed, but {folder} hides it"
             yield Entry("package", name, "broken", detail, repair="unset PYTHONPATH")
         else:
@@ -241,12 +362,12 @@ def _cache() -> Entry:
 
 def _faults(have: Mapping[str, Distribution], environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Faults of the interpreter, of packages that exclude each other, and of search paths."""
-    if fault := packages.python_fault():
+    if fault := python_fault():
         yield fault, "make an environment with one of them: python3.12 -m venv .venv"
-    for conflict in packages.conflicts(have):
+    for conflict in conflicts(have):
         yield str(conflict), conflict.repair
-    for folder, hidden in packages.shadowing_folders(environ, MODULES.values()).items():
+    for folder, hidden in shadowing_folders(environ, MODULES.values()).items():
         yield f"PYTHONPATH names {folder}, whose {', '.join(hidden)} hide the installed ones", "unset PYTHONPATH"
-    for folder, hidden in packages.loader_folders(environ).items():
+    for folder, hidden in loader_folders(environ).items():
         sentence = f"LD_LIBRARY_PATH names {folder}, whose {', '.join(hidden)} replace the installed ones"
         yield sentence, "unset LD_LIBRARY_PATH"

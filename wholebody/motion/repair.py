@@ -12,10 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.motion.avoider import Run
+from wholebody.motion.avoider import Run, keep_back
 from wholebody.motion.faults import Faults, depths_between
 from wholebody.motion.measures import MotionBounds, excess
-from wholebody.motion.one_side import keep_back
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 

@@ -18,9 +18,8 @@ from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.checks import is_a
 from wholebody.tasks.distance import Effort, without_freedoms
 from wholebody.tasks.forces import LoadedBalance
-from wholebody.tasks.frame import Hold
+from wholebody.tasks.frame import Hold, PlacementResidual
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
-from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import SeatCenterline, Sit
 from wholebody.tasks.stand import Hang, Stance, Stand

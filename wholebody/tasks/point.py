@@ -13,7 +13,7 @@ from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Goal, filled
-from wholebody.tasks.residuals import point_rows
+from wholebody.tasks.frame import point_rows
 
 
 @dataclass(frozen=True, eq=False)

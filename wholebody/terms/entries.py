@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from wholebody import tasks
 from wholebody.base.arrays import Array
 from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.frame import PlacementResidual
 from wholebody.tasks.inputs import WORLD
 from wholebody.tasks.range_of_motion import ConeRow, Coordinate, CoupledRow, EllipticRow, RangeConstraint
-from wholebody.tasks.residuals import PlacementResidual
 
 RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE, COUPLED, ELLIPSE, TWIST = range(11)
 """The tables of goals and constraints, by what a row of them stands for."""

@@ -16,6 +16,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
 from wholebody.geometry.proximity import PENETRATION
+from wholebody.tasks.frame import PlacementResidual
 from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
@@ -119,15 +120,13 @@ def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -
         if _far(goal, here):
             way *= FARTHEST_LOOK / np.linalg.norm(way)
         return pin.SE3(np.eye(3), here.translation + way), False
-    if hasattr(goal, "to"):
-        base = state.frame(scene.figure.frame_id(goal.to))
-        return (base * placement(goal.placement), True) if goal.placement is not None else (None, False)
+    asked = getattr(goal, "residual", None)
+    if isinstance(asked, PlacementResidual):
+        wanted = pin.SE3(state.frame(asked.base.frame) * asked.placement)
+        wanted.translation = wanted.translation if asked.position else here.translation
+        return wanted, asked.orientation
     if target is None or isinstance(target, str):
         return None, False
-    if not isinstance(target, pin.SE3) and np.shape(target) in ((4,), (3, 3)):
-        values = np.asarray(target, dtype=float)
-        rotation = pin.Quaternion(values).matrix() if values.shape == (4,) else values
-        return pin.SE3(rotation, here.translation), True
     if getattr(goal, "axes", "") == "xy":
         return pin.SE3(np.eye(3), np.array([target[0], target[1], 0.0])), False
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint, urdf_axis
+from wholebody.figures.urdf.joints import ANY_LIMIT, add_joint, urdf_axis
 
 OBLIQUE = np.array([1.0, -2.0, 2.0]) / 3.0
 KINDS = {

@@ -12,8 +12,7 @@ import pytest
 
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit, with_world
-from wholebody.methods.newton.chart import DisplacementRows
-from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.figure_bodies import DisplacementRows, FigureBodies
 
 K, N, H = 5, 6, 1e-6
 

@@ -11,8 +11,8 @@ import pytest
 import wholebody as wb
 from tests.freeing import begun
 from wholebody.figures.figure import Figure
+from wholebody.motion.avoider import followed
 from wholebody.motion.faults import deepest_shares, dipping
-from wholebody.motion.one_side import followed
 from wholebody.motion.trajectory import method as trajectory
 from wholebody.motion.trajectory import window_run
 from wholebody.motion.trajectory.deviations import Objective

@@ -14,7 +14,7 @@ from wholebody.bench.attack.judging import CORPUS, Pairs, chosen
 from wholebody.bench.suite.problem_sets.things import Occupied, turned
 from wholebody.bench.tables import render
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
-from wholebody.figures.urdf.writing import exact
+from wholebody.figures.urdf.joints import exact
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,8 @@ from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
 from wholebody.figures.urdf.file import UrdfFile, read_urdf
-from wholebody.figures.urdf.joints import UrdfJoint
+from wholebody.figures.urdf.joints import ANY_LIMIT, UrdfJoint, add_joint
 from wholebody.figures.urdf.srdf import read_srdf
-from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
 from wholebody.geometry.placement import along_z
 
 

@@ -58,14 +58,13 @@ class Attraction:
 
     Attributes:
         parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
-        step_length: largest motion of a part's tip in one step, m.
-        free: whether the wanted posture overlaps nothing: then a part may move away from it for a while.
         limit: of the work in the resolver's counts; beyond it joints are not tried one by one.
     """
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
         self._model, self._resolver = scene.model, resolver
-        self.step_length, self.limit, self.free = 0.0, 0, False
+        self.limit = 0
+        self._most = 0.03  # m: largest motion of a part's tip in one step; half of a forearm's width
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
         for chain in resolver.chains.values():
@@ -91,7 +90,7 @@ class Attraction:
             part = way[dofs]
             length = float(np.abs(part) @ reach)
             if not settled[k] and float(part @ part) >= 1e-12:  # rad^2: it has not arrived
-                shares[k] = min(1.0, self.step_length / length)
+                shares[k] = min(1.0, self._most / length)
             way[dofs] = part * shares[k]
         if not shares.any():
             return None
@@ -106,7 +105,7 @@ class Attraction:
         slow = []
         for k, (dofs, _) in enumerate(self.parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN and not self.free:
+            if shares[k] and old - new < LEAST_GAIN:
                 back[dofs] = True
             if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
                 slow.append(k)
@@ -134,7 +133,7 @@ class Attraction:
             if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
                 continue
             step = np.zeros(self._model.nv)
-            step[dof] = min(max(way, -self.step_length / reach), self.step_length / reach)
+            step[dof] = min(max(way, -self._most / reach), self._most / reach)
             trial = np.asarray(pin.integrate(self._model, q, step))
             if not self._resolver.query(trial):
                 q, gained = trial, True
@@ -193,41 +192,27 @@ class FrameResolver:
         """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
         resolver, attraction = self._resolver, self._attraction
         before = resolver.placed
-        attraction.free = not resolver.query(wanted)
-        resolver.margin = (
-            5e-3 if attraction.free else MARGIN
-        )  # m: limbs that return to a free posture need room to turn
-        if attraction.free and not self._passes_through(before, q, wanted):
+        free = not resolver.query(wanted)
+        resolver.margin = 5e-3 if free else MARGIN  # m: limbs that return to a free posture need room to turn
+        if free and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
             if shown is not None:
                 return shown
         attraction.limit = resolver.counts.work + BUDGET + OVERRUN
-        # m: of a chain's tip; half of a forearm's width, and less where the direct motion penetrates a bulge
-        for attraction.step_length in (0.03, 0.006):
-            attraction.limit = max(attraction.limit, resolver.counts.work + 15 + OVERRUN)
-            way = self._approach(q, wanted, before, rng)
-            chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
-            found = (self._toward(q, way[k]) for k in chosen)
-            shown = next((made for made in found if made is not None), None)
-            if shown is not None:
-                return shown
-        return None
+        way = self._approach(q, wanted, before, rng)
+        chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
+        found = (self._toward(q, way[k]) for k in chosen)
+        return next((made for made in found if made is not None), None)
 
     def _approach(self, q: Array, wanted: Array, before: QueryResult, rng: np.random.Generator) -> list[Array]:
         """Steps from a free posture towards the wanted one; returns the postures."""
         resolver = self._resolver
         settled = [False] * len(self._parts)
-        settled[-1] = later = (
-            self._attraction.free
-        )  # limbs that are pressed against something leave it before the root moves
         way = []
         for _ in range(8):
             if resolver.counts.work > self._attraction.limit - OVERRUN:
                 break
             moved = self._attraction.step(q, wanted, settled)
-            if moved is None and later:
-                settled[-1] = later = False
-                moved = self._attraction.step(q, wanted, settled)
             if moved is None:
                 break
             for chain in resolver.chains.values():

@@ -11,8 +11,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, ReachCone, TwistRange
-from wholebody.methods.ccd.guards_kernel import compiled_kernel
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, rotated, three
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, compiled_kernel, rotated, three
 from wholebody.methods.ccd.sweep import Aims
 
 
@@ -270,41 +269,20 @@ class Guard:
             if self._remember():
                 return True
         if self._last is not None:
-            self._retreat(self._last)
+            self._limbs.values[self._rows] = self._last
+            self._limbs.forward()
         return self._remember()
-
-    def _inside(self) -> bool:
-        for part in self.parts:  # noqa: SIM110 -- `all` takes twice as long for so few
-            if not part.inside():
-                return False
-        return True
 
     def _remember(self) -> bool:
         """Whether all parts are inside, which the nodes' values alone decide; the last ones inside are kept."""
         values = self._limbs.values[self._rows]
         seen = values.tobytes()  # numpy takes five times as long to compare so few
         if seen != self._seen:
-            if not self._inside():
-                return False
+            for part in self.parts:
+                if not part.inside():
+                    return False
             self._last, self._seen = values, seen
         return True
-
-    def _retreat(self, last: Array) -> None:
-        """Move from the last values inside as far towards the present ones as all parts allow."""
-        wanted = self._limbs.values[self._rows]
-        inside, outside = 0.0, 1.0
-        for _ in range(20):  # to a millionth of the motion
-            middle = 0.5 * (inside + outside)
-            self._blend(last, wanted, middle)
-            if self._inside():
-                inside = middle
-            else:
-                outside = middle
-        self._blend(last, wanted, inside)
-
-    def _blend(self, first: Array, second: Array, share: float) -> None:
-        self._limbs.values[self._rows] = first + share * (second - first)
-        self._limbs.forward()
 
 
 def guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[Guard]:

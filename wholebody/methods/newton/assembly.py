@@ -30,8 +30,8 @@ from wholebody.methods.newton.assembly_system import (
 )
 from wholebody.methods.newton.assembly_system import Kind as GoalKind
 from wholebody.methods.newton.batches import Batch, EquationSet, Unit
-from wholebody.methods.newton.chart import Chart, DisplacementRows
 from wholebody.methods.newton.feasibility import satisfy
+from wholebody.methods.newton.figure_bodies import Chart, DisplacementRows
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.measures import Objective, refine

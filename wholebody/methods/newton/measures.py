@@ -1,8 +1,12 @@
-"""The measures as rows whose squares are minimised, and the descent of the measures: docs/theory/newton.md."""
+"""The measures as rows whose squares are minimised, and their descent: docs/theory/newton.md.
+
+`Anderson` accelerates steps that form a linear sequence (Walker and Ni 2011, type II).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +14,8 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
 from wholebody.figures.state import State
-from wholebody.methods.acceleration import Anderson
 from wholebody.methods.newton.batches import OBJECTIVE, Batch
-from wholebody.methods.newton.chart import DisplacementRows
-from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.figure_bodies import DisplacementRows, FigureBodies
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra import SingularSystemError
 from wholebody.methods.newton.own_rows import TangentRows, quadratic_model, square_rows
@@ -21,6 +23,43 @@ from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.problem import Problem
 from wholebody.tasks.base import Measure
+
+DEPTH = 5  # steps remembered; more adds little where a handful of joints settles slowly
+STRETCH = 6.0  # an accelerated step is at most this many times the plain one
+
+
+class Anderson:
+    """Remembers plain steps and the displacements actually made."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past steps: after a rejected step, or far from the goals."""
+        self._step: Array | None = None  # whose displacement is not known yet
+        self._steps: list[Array] = []
+        self._displacements: list[Array] = []
+
+    def propose(self, step: Array) -> Array | None:
+        """The accelerated step for the plain one (k,), at most `STRETCH` times as long; None while too little known."""
+        self._step = step
+        if len(self._steps) < 2:
+            return None
+        steps, displacements = np.array([*self._steps[-DEPTH:], step]), np.array(self._displacements[-DEPTH:])
+        changes = steps[1:] - steps[:-1]
+        coefficients = np.linalg.lstsq(changes.T, step, rcond=None)[0]
+        fast: Array = step - coefficients @ (displacements + changes)
+        longest, size = STRETCH * float(np.abs(step).max()), float(np.abs(fast).max())
+        if not isfinite(size):
+            return None
+        return fast if size <= longest else fast * (longest / size)
+
+    def record(self, displacement: Array) -> None:
+        """Remember the displacement (k,) that was made after the last step was proposed."""
+        if self._step is not None:
+            self._steps.append(self._step)
+            self._displacements.append(displacement)
+            self._step = None
 
 
 class Objective:

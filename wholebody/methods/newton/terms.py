@@ -23,7 +23,7 @@ from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Goal
 from wholebody.tasks.checks import undefined
-from wholebody.tasks.residuals import PlacementResidual
+from wholebody.tasks.frame import PlacementResidual
 
 
 def state_equations(problem: Problem, state: State) -> None:

@@ -18,7 +18,7 @@ from wholebody.base.errors import MissingPackageError
 from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import free_roots
-from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint, urdf_axis
+from wholebody.figures.urdf.joints import ANY_LIMIT, add_joint, urdf_axis
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem

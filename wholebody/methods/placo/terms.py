@@ -14,8 +14,8 @@ from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError, named_terms
 from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
+from wholebody.tasks.frame import PlacementResidual
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.residuals import PlacementResidual
 
 Frames = dict[str, tuple[int, pin.SE3]]
 

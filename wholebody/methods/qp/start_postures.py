@@ -25,11 +25,10 @@ from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.bounds import allowed
 from wholebody.tasks.contact_parts import Gap, Near, approached, has_face
-from wholebody.tasks.frame import Frame
+from wholebody.tasks.frame import Frame, PlacementResidual
 from wholebody.tasks.grips import Opposing, opened, takes_bar
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.point import Point
-from wholebody.tasks.residuals import PlacementResidual
 from wholebody.tasks.surfaces import nearest
 from wholebody.tasks.touch import Touch, on_its_side
 

@@ -17,11 +17,10 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.swept_depth import Depths
-from wholebody.motion.avoider import Run
+from wholebody.motion.avoider import Run, followed, kept_beside
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, deepest_shares, dipping
 from wholebody.motion.measures import jerk_ratio
-from wholebody.motion.one_side import followed, kept_beside
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import MET, NEAREST, Node, NodeEvaluator

@@ -17,8 +17,8 @@ from wholebody.bench.suite.adapters.urdf import axis_of
 from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
+from wholebody.tasks.frame import PlacementResidual
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.residuals import PlacementResidual
 
 
 class Drake(OneCall["_Plant"]):

@@ -22,7 +22,7 @@ from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import TOOL, Iteration, Settings, StepError
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.tasks.residuals import PlacementResidual
+from wholebody.tasks.frame import PlacementResidual
 
 
 class PostureCost(NamedTuple):

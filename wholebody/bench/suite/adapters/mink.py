@@ -22,8 +22,8 @@ from wholebody.bench.suite.adapters.loop import (
 from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
 from wholebody.figures.figure import Figure
 from wholebody.problem import Problem
+from wholebody.tasks.frame import PlacementResidual
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.residuals import PlacementResidual
 
 
 class Mink(Loop):

@@ -17,7 +17,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.files import Scratch
 from wholebody.bench.suite.adapters.base import OneCall
 from wholebody.bench.suite.adapters.urdf import axis_of
-from wholebody.figures.urdf.writing import add_model_joint
+from wholebody.figures.urdf.joints import add_model_joint
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 

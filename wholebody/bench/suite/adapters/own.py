@@ -20,7 +20,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.step_program import QPStep
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Goal, filled
-from wholebody.tasks.residuals import point_rows
+from wholebody.tasks.frame import point_rows
 
 RETARGET = "retarget"
 """In place of a solver: a new `Point` and `Problem.retarget` at each step, where others move a target in place."""

@@ -15,8 +15,8 @@ from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY
 from wholebody.bench.suite.adapters.loop import Loop, Stepper, TaskStepper, TaskTool, kept_apart, longest_moves, size
 from wholebody.geometry.flesh import settled
 from wholebody.problem import Problem
+from wholebody.tasks.frame import PlacementResidual
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.residuals import PlacementResidual
 
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
 

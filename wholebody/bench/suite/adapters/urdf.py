@@ -15,7 +15,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.figures.description import follows
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf.writing import UrdfAxis, exact, urdf_axis
+from wholebody.figures.urdf.joints import UrdfAxis, exact, urdf_axis
 from wholebody.geometry.flesh import settled
 from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import Place

@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.postures import placed
-from wholebody.figures.urdf.writing import exact
+from wholebody.figures.urdf.joints import exact
 from wholebody.geometry.pieces import hull_triangles, swept_points
 from wholebody.geometry.placement import placement
 

@@ -20,7 +20,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.things import hull_obj, shape_of
 from wholebody.bench.suite.published.rebuilt import SHAPES, VERSION, model_of
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf.writing import add_joint, add_model_joint, exact, urdf_axis
+from wholebody.figures.urdf.joints import add_joint, add_model_joint, exact, urdf_axis
 from wholebody.geometry.flesh import settled
 
 Meshes = dict[str, str]  # text of OBJ files by their path below the folder of an export

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wholebody.methods.acceleration import STRETCH, Anderson
+from wholebody.methods.newton.measures import STRETCH, Anderson
 
 
 def run(matrix, start, count):
