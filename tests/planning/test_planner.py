@@ -84,6 +84,19 @@ def test_a_clearance_is_kept_where_the_ends_keep_it(least_distance: Distance) ->
     assert least_along(problem.scene, found.clip.q, least_distance) >= asked - 1e-6
 
 
+def test_a_clearance_beyond_the_distance_of_queries_is_kept(
+    free_bodies: Callable[..., wb.Figure], least_distance: Distance
+) -> None:
+    """Bounds from below of pairs that are not near were less than 22 mm, and counted as too near for 20 mm."""
+    figure = free_bodies(wb.Sphere(0.1))
+    scene = wb.Scene(figure).add(wb.Box((0.2, 0.4, 0.4)), name="box")
+    start, end = figure.neutral.copy(), figure.neutral.copy()
+    start[0], end[0] = -0.6, 0.6
+    found = wb.plan(scene, start, end, clearance=0.05)
+    check(found, start, end, Pace())
+    assert least_along(scene, found.clip.q, least_distance) >= 0.05 - 1e-4
+
+
 def test_a_person_reaches_through_a_hole_on_its_feet(least_distance: Distance) -> None:
     problem = problem_set("passage").make(3, 0).problem
     scene, figure = problem.scene, problem.scene.figure
