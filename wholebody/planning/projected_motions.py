@@ -22,7 +22,8 @@ from wholebody.planning.local_planner import MARGIN, MISSED, Geodesics, Kept
 from wholebody.planning.projection_kernel import displace
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.terms.linearisation import ConstraintValues
+from wholebody.tasks.point import Point
+from wholebody.terms.linearisation import ConstraintValues, Lineariser
 
 STEP = 0.05  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
 ITERATIONS = 8  # of a projection, which takes two or three from a step
@@ -45,11 +46,15 @@ class ProjectedMotions(Geodesics):
         bare = problem.with_start(problem.start)
         bare.goals = bare.measures = ()
         self._lineariser = bare.lineariser(workspace)
+        self._aimed = bare.with_start(problem.start)
+        self._reach: Lineariser | None = None
         terms, state = problem.constraints, workspace.state.update(problem.start)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
         self._away = np.zeros(self._model.nv)
+        self._depends = np.zeros(self._model.nv, dtype=bool)  # freedoms that moved what is held wherever that was seen
+        self._on = set[bytes]()  # postures on what is held, or joined to these by freedoms that do not move it
         self._last = b"", self._away  # the posture that was linearised last, and its values of constraints
         # of steps: contacts, which take most of the time of a posture, are equalities
         loose = [not (term.lower == term.upper).all() for term in terms]
@@ -74,9 +79,15 @@ class ProjectedMotions(Geodesics):
         displace(at.jacobian, np.hstack([at.value, at.gap]), never, aims, at.box, self._away)
         return np.asarray(pin.integrate(self._model, q, self._away))
 
+    @property
+    def idle(self) -> Mask:
+        """(nv,) which freedoms move nothing that is held, as far as that was seen."""
+        return ~self._depends
+
     def admit(self, q: Array) -> None:
         """See `Geodesics`."""
         super().admit(q)
+        self._displaced(q, self._kept.sides, self._bounds)
         least = np.maximum(self._least + MISSED + self.bent, 0.0)
         self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
 
@@ -90,17 +101,43 @@ class ProjectedMotions(Geodesics):
 
     def _within(self, q: Array, kept: Kept) -> bool:
         state = self._workspace.state.update(q)
-        if kept is self._followed:
+        key = q.tobytes()
+        if kept is self._followed or key in self._on:
             values, sides = self._loose.at(state), kept.sides[:, self._rows]
         else:
             known, values = self._last
-            values, sides = values if known == q.tobytes() else self._values.at(state), kept.sides
+            values, sides = values if known == key else self._values.at(state), kept.sides
+            on = values[self._equal], sides[:, self._equal]
+            if (on[0] >= on[1][0]).all() and (on[0] <= on[1][1]).all():
+                self._on.add(key)
         return bool((values >= sides[0]).all() and (values <= sides[1]).all())
+
+    def reaching(self, q: Array, tip: str, place: Array, still: Mask) -> Array:
+        """The posture (nq,) near q with a frame at a place (3,), on what is held, as nearly as a few iterations get.
+
+        Freedoms in a mask (nv,) stay.
+        """
+        goal = Point(tip, place).resolve(self._aimed.scene, q)
+        if self._reach is None:
+            self._aimed.goals = (goal,)
+            self._reach = self._aimed.lineariser(self._workspace)
+        self._reach.take((goal,), self._reach.clearances)
+        aims = np.hstack([np.zeros((2, 3)), np.where(self._equal, self._bounds, self._kept.sides)])
+        for _ in range(6):  # more = nearer to places out of reach, dearer
+            at = self._reach.packed(q, -1.0)
+            if not displace(at.jacobian, at.value, aims, aims, np.where(still, 0.0, at.box), self._away):
+                break
+            size = float(np.abs(self._away).max())
+            q = np.asarray(pin.integrate(self._model, q, min(1.0, 0.5 / max(size, 1e-15)) * self._away))  # rad, m
+            if size < 1e-3:
+                break
+        return q
 
     def _displaced(self, q: Array, sides: Array, aims: Array) -> tuple[Array, bool]:
         """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""
         at, away = self._lineariser.packed(q, -1.0), self._away  # no pairs
         self._last = q.tobytes(), at.value
+        self._depends |= (at.jacobian[: len(at.value)][self._equal] != 0.0).any(axis=0)
         needed = displace(at.jacobian, at.value, sides, aims, at.box, away)
         return (np.asarray(pin.integrate(self._model, q, away)), True) if needed else (q, False)
 
@@ -121,7 +158,10 @@ class ProjectedMotions(Geodesics):
             size = float(np.abs(motion).max(initial=0.0))
             last = size <= STEP and self.met(target)
             share = min(1.0, STEP / max(size, 1e-15))
-            there = target if last else self._projected(np.asarray(pin.integrate(self._model, q, share * motion)))
+            ahead = np.asarray(pin.integrate(self._model, q, share * motion))
+            if not (last or motion[self._depends].any()):  # it stays on what is held
+                self._on.add(ahead.tobytes())
+            there = target if last else ahead if ahead.tobytes() in self._on else self._projected(ahead)
             if there is None or not self._leads(q, there):
                 break
             way.append(there)

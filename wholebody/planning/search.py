@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.ends import End, nearer
 from wholebody.planning.local_planner import Geodesics
+from wholebody.planning.projected_motions import ProjectedMotions
 from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import length, shortcut
@@ -26,6 +27,7 @@ AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
+REACHED = 0.5  # of the samples beside what is held: a tip is displaced, and all else follows; more = less else is tried
 POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
 
 
@@ -159,12 +161,36 @@ class Search:
             share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
             middle = np.asarray(pin.interpolate(model, start, near, share))
             sample = self._sampler.near(middle, self._spread(trees.samples))
+            if isinstance(self._local, ProjectedMotions) and self._rng.uniform() < REACHED:
+                sample = self._displaced(self._local, middle, near)
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
             path = trees.grow(sample)
             if path is not None:
                 return path, trees
         return None, trees
+
+    def _displaced(self, local: ProjectedMotions, q: Array, end: Array) -> Array:
+        """A posture (nq,) near q that meets what is held, with one of the tips that the motion moves somewhere else.
+
+        What carries a thing round another one has few freedoms: joints at random seldom move all of a body that way.
+        """
+        figure = self._problem.scene.figure
+        chains = list(figure.chains.values())
+        here, there, at = (
+            np.array([figure.placement(each, chain.tip).translation for chain in chains])
+            for each in (self._problem.start, end, q)
+        )
+        far = np.linalg.norm(there - here, axis=1)
+        if not far.any():
+            return q
+        number = int(self._rng.choice(len(chains), p=far / far.sum()))
+        chain, way = chains[number], self._rng.normal(size=3)
+        reach = np.linalg.norm(at[number] - figure.placement(q, chain.joints[0]).translation)
+        way *= reach * self._rng.uniform() / np.linalg.norm(way)
+        # limbs that move nothing that is held cost a tenth of others
+        still = ~local.idle if self._rng.uniform() < 0.5 else np.zeros_like(local.idle)
+        return local.reaching(q, chain.tip, at[number] + way, still)
 
     def _spread(self, samples: int) -> float:
         """Of the next of so many samples; bodies get through most narrow places sooner if the root alone turns."""
