@@ -53,8 +53,7 @@ class ProjectedMotions(Geodesics):
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
         self._away = np.zeros(self._model.nv)
-        self._depends = np.zeros(self._model.nv, dtype=bool)  # freedoms that moved what is held wherever that was seen
-        self._on = set[bytes]()  # postures on what is held, or joined to these by freedoms that do not move it
+        self._on = set[bytes]()  # postures that were seen to be on what is held
         self._last = b"", self._away  # the posture that was linearised last, and its values of constraints
         # of steps: contacts, which take most of the time of a posture, are equalities
         loose = [not (term.lower == term.upper).all() for term in terms]
@@ -79,15 +78,9 @@ class ProjectedMotions(Geodesics):
         displace(at.jacobian, np.hstack([at.value, at.gap]), never, aims, at.box, self._away)
         return np.asarray(pin.integrate(self._model, q, self._away))
 
-    @property
-    def idle(self) -> Mask:
-        """(nv,) which freedoms move nothing that is held, as far as that was seen."""
-        return ~self._depends
-
     def admit(self, q: Array) -> None:
         """See `Geodesics`."""
         super().admit(q)
-        self._displaced(q, self._kept.sides, self._bounds)
         least = np.maximum(self._least + MISSED + self.bent, 0.0)
         self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
 
@@ -112,11 +105,8 @@ class ProjectedMotions(Geodesics):
                 self._on.add(key)
         return bool((values >= sides[0]).all() and (values <= sides[1]).all())
 
-    def reaching(self, q: Array, tip: str, place: Array, still: Mask) -> Array:
-        """The posture (nq,) near q with a frame at a place (3,), on what is held, as nearly as a few iterations get.
-
-        Freedoms in a mask (nv,) stay.
-        """
+    def reaching(self, q: Array, tip: str, place: Array) -> Array:
+        """The posture (nq,) near q with a frame at a place (3,), on what is held, as nearly as a few iterations get."""
         goal = Point(tip, place).resolve(self._aimed.scene, q)
         if self._reach is None:
             self._aimed.goals = (goal,)
@@ -125,7 +115,7 @@ class ProjectedMotions(Geodesics):
         aims = np.hstack([np.zeros((2, 3)), np.where(self._equal, self._bounds, self._kept.sides)])
         for _ in range(6):  # more = nearer to places out of reach, dearer
             at = self._reach.packed(q, -1.0)
-            if not displace(at.jacobian, at.value, aims, aims, np.where(still, 0.0, at.box), self._away):
+            if not displace(at.jacobian, at.value, aims, aims, at.box, self._away):
                 break
             size = float(np.abs(self._away).max())
             q = np.asarray(pin.integrate(self._model, q, min(1.0, 0.5 / max(size, 1e-15)) * self._away))  # rad, m
@@ -137,7 +127,6 @@ class ProjectedMotions(Geodesics):
         """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""
         at, away = self._lineariser.packed(q, -1.0), self._away  # no pairs
         self._last = q.tobytes(), at.value
-        self._depends |= (at.jacobian[: len(at.value)][self._equal] != 0.0).any(axis=0)
         needed = displace(at.jacobian, at.value, sides, aims, at.box, away)
         return (np.asarray(pin.integrate(self._model, q, away)), True) if needed else (q, False)
 
@@ -158,10 +147,7 @@ class ProjectedMotions(Geodesics):
             size = float(np.abs(motion).max(initial=0.0))
             last = size <= STEP and self.met(target)
             share = min(1.0, STEP / max(size, 1e-15))
-            ahead = np.asarray(pin.integrate(self._model, q, share * motion))
-            if not (last or motion[self._depends].any()):  # it stays on what is held
-                self._on.add(ahead.tobytes())
-            there = target if last else ahead if ahead.tobytes() in self._on else self._projected(ahead)
+            there = target if last else self._projected(np.asarray(pin.integrate(self._model, q, share * motion)))
             if there is None or not self._leads(q, there):
                 break
             way.append(there)

@@ -46,6 +46,7 @@ class Search:
         self._local, self._slides = planners
         self._sampler, self._rng = random
         self._reached: list[Array] = []
+        self._moved: dict[bytes, Array] = {}  # how far an end is from the start for each chain's tip, metres
         self._said = ""
         self._held = holds(problem)
         free_root = bool(problem.scene.figure.roots) and not self._held
@@ -53,7 +54,7 @@ class Search:
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
         self._tightens = self._local is not self._slides
-        self._again = HELD_AGAIN if self._held else AGAIN
+        self._again = HELD_AGAIN if self._held and problem.scene.figure.roots else AGAIN
         self._straight, self._until = False, self._again
 
     def shortest(self) -> tuple[list[Array] | None, str]:
@@ -176,21 +177,19 @@ class Search:
         What carries a thing round another one has few freedoms: joints at random seldom move all of a body that way.
         """
         figure = self._problem.scene.figure
-        chains = list(figure.chains.values())
-        here, there, at = (
-            np.array([figure.placement(each, chain.tip).translation for chain in chains])
-            for each in (self._problem.start, end, q)
-        )
-        far = np.linalg.norm(there - here, axis=1)
+        chains, key = list(figure.chains.values()), end.tobytes()
+        if key not in self._moved:
+            ends = (self._problem.start, end)
+            here, there = ([figure.placement(each, chain.tip).translation for chain in chains] for each in ends)
+            self._moved[key] = np.linalg.norm(np.subtract(there, here).reshape(-1, 3), axis=1)
+        far = self._moved[key]
         if not far.any():
             return q
-        number = int(self._rng.choice(len(chains), p=far / far.sum()))
-        chain, way = chains[number], self._rng.normal(size=3)
-        reach = np.linalg.norm(at[number] - figure.placement(q, chain.joints[0]).translation)
-        way *= reach * self._rng.uniform() / np.linalg.norm(way)
-        # limbs that move nothing that is held cost a tenth of others
-        still = ~local.idle if self._rng.uniform() < 0.5 else np.zeros_like(local.idle)
-        return local.reaching(q, chain.tip, at[number] + way, still)
+        chain = chains[self._rng.choice(len(chains), p=far / far.sum())]
+        *joints, at = (figure.placement(q, name).translation for name in (*chain.joints, chain.tip))
+        way = self._rng.normal(size=3)
+        way *= self._rng.uniform() * np.linalg.norm(np.diff([*joints, at], axis=0), axis=1).sum() / np.linalg.norm(way)
+        return local.reaching(q, chain.tip, at + way)
 
     def _spread(self, samples: int) -> float:
         """Of the next of so many samples; bodies get through most narrow places sooner if the root alone turns."""
