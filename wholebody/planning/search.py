@@ -27,7 +27,7 @@ AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
-REACHED = 0.5  # of the samples beside what is held: a tip is displaced, and all else follows; more = less else is tried
+REACHED = 0.3  # of the samples beside what is held: a tip is displaced, and all else follows; more = less else is tried
 POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
 
 
