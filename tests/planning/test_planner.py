@@ -84,6 +84,15 @@ def test_a_clearance_is_kept_where_the_ends_keep_it(least_distance: Distance) ->
     assert least_along(problem.scene, found.clip.q, least_distance) >= asked - 1e-6
 
 
+def test_an_arm_plans_with_a_clearance_beyond_the_distance_of_queries() -> None:
+    """Pairs that are not near had 20 mm as their bound, which counted as too near for a clearance of that."""
+    figure, start = known_arm("panda")
+    end = figure.with_joints(start, {"axis1": 0.5})  # no distance changes
+    found = wb.plan(wb.Scene(figure), start, end, clearance=0.03)
+    check(found, start, end, Pace())
+    assert found.message == "the straight motion"
+
+
 def test_a_person_reaches_through_a_hole_on_its_feet(least_distance: Distance) -> None:
     problem = problem_set("passage").make(3, 0).problem
     scene, figure = problem.scene, problem.scene.figure
@@ -469,6 +478,12 @@ def test_goals_out_of_reach_and_wrong_ends_are_told() -> None:
     named = rf"plan: at the goal {joint} is {limit + 0.1:.4g}, beyond its limits .* and {limit:.4g}"
     with pytest.raises(wb.InputError, match=named):
         wb.plan(scene, problem.start, beyond)
+    with pytest.raises(wb.InputError, match=r"a StepLimit bounds no plan; give pace="):
+        wb.plan(scene, problem.start, end, constraints=[wb.tasks.StepLimit(0.5)])
+    folded = np.array(end)
+    folded[2] = scene.figure.limits.lower[2] - 0.1  # into itself too, as that is beyond
+    with pytest.raises(wb.InputError, match=r"plan: at the goal .*, beyond its limits"):
+        wb.plan(scene, problem.start, folded)
     scene.add(wb.Sphere(0.2), name="ball", at=scene.figure.placement(problem.start, "tool").translation)
     with pytest.raises(wb.InputError, match=r"plan: at the start .*ball.* overlap by \d+ mm"):
         wb.plan(scene, problem.start, end)
@@ -880,6 +895,22 @@ def test_a_level_tool_goes_past_a_box(least_distance: Distance, seed: int) -> No
     for q in found.clip.q:
         assert np.abs(figure.placement(q, "tool").rotation[:2, 2]).max() <= 1e-4
     assert least_along(scene, found.clip.q, least_distance) >= -5e-4
+
+
+def test_a_tip_is_displaced_and_all_else_follows_on_what_is_held() -> None:
+    human = wb.load("human")
+    start, scene, tip = human.posture("standing"), wb.Scene(human), "right_index_tip"
+    problem = wb.Problem(scene, start, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")])
+    place = human.placement(start, tip).translation + (0.25, 0.1, -0.35)
+    with problem.borrow() as workspace:
+        local = ProjectedMotions(problem, workspace)
+        local.admit(start)
+        found = local.reaching(start, tip, place)
+    np.testing.assert_allclose(human.placement(found, tip).translation, place, atol=1e-3)
+    for side in ("left", "right"):
+        apart = human.placement(start, f"{side}_foot").actInv(human.placement(found, f"{side}_foot"))
+        np.testing.assert_allclose(apart.homogeneous, np.eye(4), atol=1e-4)
+    assert np.abs(pin.difference(human.model, start, found)[:3]).max() > 0.02
 
 
 def test_projected_steps_stay_on_what_is_held_and_end_where_they_should() -> None:

@@ -58,6 +58,7 @@ class Geodesics:
         self._clearance = problem.clearance
         self.partial = True  # whether one joint may move in another way than before, and all others as they did
         self._least = np.array(problem.clearances)
+        self._asked = 0.02 + float(self._least.max(initial=0.0))  # m: of queries; larger: fewer and dearer ones
         pieces = workspace.geometry.geometryObjects
         centres = np.array([np.linalg.norm(piece.placement.translation) for piece in pieces])
         # of every kind of pairs by every freedom
@@ -208,7 +209,7 @@ class Geodesics:
         if not self._within(q, kept):
             return None
         proximity, data = self._workspace.proximity, self._workspace.state.data
-        room = proximity.least(data, 0.02) - self._least  # m; larger: fewer and dearer queries
+        room = proximity.least(data, self._asked) - self._least
         return Seen(room, proximity.distances.placed.copy()) if (room >= kept.room).all() else None
 
     def _joins(self, q: Array, motion: Array, seen: Seen | None, ahead: Seen | None, kept: Kept | None = None) -> bool:

@@ -35,6 +35,7 @@ from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal
+from wholebody.tasks.bounds import StepLimit
 
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
@@ -134,6 +135,8 @@ def plan(
     began = _computed()
     with ctrl_c_ends_all(), within_budget(max(limit, 0.1)):  # s: the straight motion of an arm takes less
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
+        if any(isinstance(bound, StepLimit) for bound in problem.bounds):
+            raise InputError("plan: a StepLimit bounds no plan; give pace=wb.planning.Pace(velocity=1.0)")
         _check_end(problem, problem.start, "start")
         sampler = Sampler(problem, rng)
         ends = answers(problem, sampler) if goals else iter([(_posture(problem, goal), "")])
@@ -182,10 +185,6 @@ def _posture(problem: Problem, goal: Any) -> Array:
 
 def _check_end(problem: Problem, q: Array, what: str) -> None:
     judged, scene = assess(problem, q), problem.scene
-    if not judged.penetration <= KEPT:
-        deepest = [scene.piece_owner[piece] for piece in scene.contacts(q, 0.0).pair[:1].ravel().tolist()]
-        who, depth = " and ".join(deepest) or "things", f"{1e3 * judged.penetration:.3g} mm"
-        raise InputError(f"plan: at the {what} {who} overlap by {depth}; give a posture of wb.solve")
     if not judged.limit_violation <= KEPT:
         limits = scene.figure.limits
         here = q[limits.idx_q]
@@ -195,6 +194,10 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
             f"plan: at the {what} {joint} is {here[most]:.4g}, beyond its limits {limits.lower[most]:.4g} and "
             f"{limits.upper[most]:.4g}; give figure.clamp(q) for the nearest posture within limits"
         )
+    if not judged.penetration <= KEPT:
+        deepest = [scene.piece_owner[piece] for piece in scene.contacts(q, 0.0).pair[:1].ravel().tolist()]
+        who, depth = " and ".join(deepest) or "things", f"{1e3 * judged.penetration:.3g} mm"
+        raise InputError(f"plan: at the {what} {who} overlap by {depth}; give a posture of wb.solve")
     if not judged.constraint_violation <= KEPT:
         state = scene.state(q)
         values = [(term, term.value(state)) for term in problem.constraints]

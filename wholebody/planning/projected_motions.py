@@ -22,7 +22,8 @@ from wholebody.planning.local_planner import MARGIN, MISSED, Geodesics, Kept
 from wholebody.planning.projection_kernel import displace
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.terms.linearisation import ConstraintValues
+from wholebody.tasks.point import Point
+from wholebody.terms.linearisation import ConstraintValues, Lineariser
 
 STEP = 0.05  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
 ITERATIONS = 8  # of a projection, which takes two or three from a step
@@ -45,11 +46,14 @@ class ProjectedMotions(Geodesics):
         bare = problem.with_start(problem.start)
         bare.goals = bare.measures = ()
         self._lineariser = bare.lineariser(workspace)
+        self._aimed = bare.with_start(problem.start)
+        self._reach: Lineariser | None = None
         terms, state = problem.constraints, workspace.state.update(problem.start)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
         self._away = np.zeros(self._model.nv)
+        self._on = set[bytes]()  # postures that were seen to be on what is held
         self._last = b"", self._away  # the posture that was linearised last, and its values of constraints
         # of steps: contacts, which take most of the time of a posture, are equalities
         loose = [not (term.lower == term.upper).all() for term in terms]
@@ -90,12 +94,34 @@ class ProjectedMotions(Geodesics):
 
     def _within(self, q: Array, kept: Kept) -> bool:
         state = self._workspace.state.update(q)
-        if kept is self._followed:
+        key = q.tobytes()
+        if kept is self._followed or key in self._on:
             values, sides = self._loose.at(state), kept.sides[:, self._rows]
         else:
             known, values = self._last
-            values, sides = values if known == q.tobytes() else self._values.at(state), kept.sides
+            values, sides = values if known == key else self._values.at(state), kept.sides
+            on = values[self._equal], sides[:, self._equal]
+            if (on[0] >= on[1][0]).all() and (on[0] <= on[1][1]).all():
+                self._on.add(key)
         return bool((values >= sides[0]).all() and (values <= sides[1]).all())
+
+    def reaching(self, q: Array, tip: str, place: Array) -> Array:
+        """The posture (nq,) near q with a frame at a place (3,), on what is held, as nearly as a few iterations get."""
+        goal = Point(tip, place).resolve(self._aimed.scene, q)
+        if self._reach is None:
+            self._aimed.goals = (goal,)
+            self._reach = self._aimed.lineariser(self._workspace)
+        self._reach.take((goal,), self._reach.clearances)
+        aims = np.hstack([np.zeros((2, 3)), np.where(self._equal, self._bounds, self._kept.sides)])
+        for _ in range(6):  # more = nearer to places out of reach, dearer
+            at = self._reach.packed(q, -1.0)
+            if not displace(at.jacobian, at.value, aims, aims, at.box, self._away):
+                break
+            size = float(np.abs(self._away).max())
+            q = np.asarray(pin.integrate(self._model, q, min(1.0, 0.5 / max(size, 1e-15)) * self._away))  # rad, m
+            if size < 1e-3:
+                break
+        return q
 
     def _displaced(self, q: Array, sides: Array, aims: Array) -> tuple[Array, bool]:
         """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""

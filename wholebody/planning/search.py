@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array
 from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning.ends import End, nearer
 from wholebody.planning.local_planner import Geodesics
+from wholebody.planning.projected_motions import ProjectedMotions
 from wholebody.planning.rrt_connect import GEODESICS, RRTConnect
 from wholebody.planning.sampling import Sampler, holds
 from wholebody.planning.smoothing import length, shortcut
@@ -26,6 +27,7 @@ AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
+REACHED = 0.3  # of the samples beside what is held: a tip is displaced, and all else follows; more = less else is tried
 POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
 
 
@@ -44,6 +46,7 @@ class Search:
         self._local, self._slides = planners
         self._sampler, self._rng = random
         self._reached: list[Array] = []
+        self._moved: dict[bytes, Array] = {}  # how far an end is from the start for each chain's tip, metres
         self._said = ""
         self._held = holds(problem)
         free_root = bool(problem.scene.figure.roots) and not self._held
@@ -51,7 +54,7 @@ class Search:
         self._spreads = (0.0,) * free_root + (0.1, 0.3, 1.0)
         self._slides.admit(problem.start)
         self._tightens = self._local is not self._slides
-        self._again = HELD_AGAIN if self._held else AGAIN
+        self._again = HELD_AGAIN if self._held and problem.scene.figure.roots else AGAIN
         self._straight, self._until = False, self._again
 
     def shortest(self) -> tuple[list[Array] | None, str]:
@@ -159,12 +162,34 @@ class Search:
             share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
             middle = np.asarray(pin.interpolate(model, start, near, share))
             sample = self._sampler.near(middle, self._spread(trees.samples))
+            if isinstance(self._local, ProjectedMotions) and self._rng.uniform() < REACHED:
+                sample = self._displaced(self._local, middle, near)
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
             path = trees.grow(sample)
             if path is not None:
                 return path, trees
         return None, trees
+
+    def _displaced(self, local: ProjectedMotions, q: Array, end: Array) -> Array:
+        """A posture (nq,) near q that meets what is held, with one of the tips that the motion moves somewhere else.
+
+        What carries a thing round another one has few freedoms: joints at random seldom move all of a body that way.
+        """
+        figure = self._problem.scene.figure
+        chains, key = list(figure.chains.values()), end.tobytes()
+        if key not in self._moved:
+            ends = (self._problem.start, end)
+            here, there = ([figure.placement(each, chain.tip).translation for chain in chains] for each in ends)
+            self._moved[key] = np.linalg.norm(np.subtract(there, here).reshape(-1, 3), axis=1)
+        far = self._moved[key]
+        if not far.any():
+            return q
+        chain = chains[self._rng.choice(len(chains), p=far / far.sum())]
+        *joints, at = (figure.placement(q, name).translation for name in (*chain.joints, chain.tip))
+        way = self._rng.normal(size=3)
+        way *= self._rng.uniform() * np.linalg.norm(np.diff([*joints, at], axis=0), axis=1).sum() / np.linalg.norm(way)
+        return local.reaching(q, chain.tip, at + way)
 
     def _spread(self, samples: int) -> float:
         """Of the next of so many samples; bodies get through most narrow places sooner if the root alone turns."""
