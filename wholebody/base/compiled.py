@@ -95,6 +95,8 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
             **options,
         }
         loop: F = loop_type(function, targetoptions=target)
+        if inner and function.__name__.startswith("_"):
+            return loop  # kept as a part of its callers, which are in the same module
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
         return loop
