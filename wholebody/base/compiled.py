@@ -247,13 +247,13 @@ def _loop_type() -> Any:
     from numba.core import event
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.registry import CPUDispatcher
+    from numba.core.registry import CPUDispatcher, cpu_target
     from numba.core.runtime.context import NRTContext
     from numba.core.types.misc import unliteral
 
     def counted(nrt: Any, builder: Any, kind: Any, value: Any) -> Any:
         """What numba counts the references of in a value. Its own code also reads the six other parts of each array."""
-        models = nrt._context.data_model_manager
+        models = cpu_target.target_context.data_model_manager
         model = models[kind]
         found = [(kind, model.get_nrt_meminfo(builder, value))] if model.has_nrt_meminfo() else []
         for inner, part in model.traverse(builder):
