@@ -9,8 +9,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pytest
+from numba.core.runtime import _nrt_python, rtsys
+from numpy.typing import NDArray
 
 from wholebody.base import compiled
 
@@ -117,9 +121,13 @@ from wholebody.base.compiled import compiled
 def half(x):
     return 0.5 * x
 
+@compiled(inner=True)
+def _own(x):
+    return 0.5 * half(x)
+
 @compiled()
 def quarter(x):
-    return 0.5 * half(x)
+    return _own(x)
 """
 
 
@@ -143,7 +151,9 @@ except TypeError as error:
     refused = "half_is_compiled_for_calls_from_compiled_functions_only"
     told = ["compiling the inner loops: up to a minute, once on a machine"]
     assert run(asks, **kept) == (["3.0", "True", "True", "1.5", refused], told)
-    assert list((tmp_path / "cache").rglob("*.nbi"))
+    names = {path.name.split("-")[0] for path in (tmp_path / "cache").rglob("*.nbi")}
+    assert {"loop_of_another_test.half", "loop_of_another_test.quarter"} <= names  # a module's own are a part of those
+    assert "loop_of_another_test._own" not in names
     # Read back without what numba needs to compile; where this fails, look how numba keeps things now (`_loop_type`).
     assert run(asks, **kept) == (["3.0", "False", "False", "1.5", refused], [])
 
@@ -156,6 +166,44 @@ if __name__ == "__main__":
         compiled.compile_in_processes(count, [(f"wholebody.loop_of_{name}_test",) for name in names])
         print(compiled.compile_seconds() > 0.0)
 """
+
+
+class Held(NamedTuple):
+    """Arrays in a record in a record, and numbers."""
+
+    inner: tuple[NDArray[np.float64], int]
+    outer: NDArray[np.float64]
+
+
+@compiled.compiled()
+def first_and_sum(held, times):
+    """A part of an array of a record, and sums over arrays that are made and dropped in a loop."""
+    total = 0.0
+    for _ in range(times):
+        made = np.empty(3)
+        made[:] = held.inner[0][:3]
+        other = (made, held.outer)
+        total += other[0][0] + other[1][held.inner[1]]
+    return held.outer[1:], total
+
+
+def test_references_of_arrays_in_records_are_counted_as_often_as_dropped() -> None:
+    """By Python's and numba's own counts, after arrays in tuples were read, made, returned and dropped."""
+    first, second = np.arange(3.0) + 1.0, np.arange(4.0)
+    held = Held((first, 2), second)
+    first_and_sum(held, 1)
+    gc.collect()
+    _nrt_python.memsys_enable_stats()
+    counts, before = (sys.getrefcount(first), sys.getrefcount(second)), rtsys.get_allocation_stats()
+    for _ in range(20):
+        part, total = first_and_sum(held, 10)
+        assert total == 30.0
+        assert part.tolist() == [1.0, 2.0, 3.0]
+    del part
+    after = rtsys.get_allocation_stats()
+    _nrt_python.memsys_disable_stats()
+    assert (sys.getrefcount(first), sys.getrefcount(second)) == counts
+    assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free > 200
 
 
 def test_processes_compile_beside_each_other_and_what_one_leaves_is_compiled_by_this_one(

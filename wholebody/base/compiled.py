@@ -94,6 +94,8 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
             **options,
         }
         loop: F = loop_type(function, targetoptions=target)
+        if inner and function.__name__.startswith("_"):
+            return loop  # kept as a part of its callers, which are in the same module
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
         return loop
@@ -244,8 +246,19 @@ def _loop_type() -> Any:
     from numba.core import event
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.registry import CPUDispatcher
+    from numba.core.registry import CPUDispatcher, cpu_target
+    from numba.core.runtime.context import NRTContext
     from numba.core.types.misc import unliteral
+
+    def counted(nrt: Any, builder: Any, kind: Any, value: Any) -> Any:
+        """What numba counts the references of in a value. Its own code also reads the six other parts of each array."""
+        models = cpu_target.target_context.data_model_manager
+        model = models[kind]
+        found = [(kind, model.get_nrt_meminfo(builder, value))] if model.has_nrt_meminfo() else []
+        for inner, part in model.traverse(builder):
+            if models[inner].contains_nrt_meminfo():
+                found += counted(nrt, builder, inner, part(value))
+        return found
 
     class Library(JITCodeLibrary):  # type: ignore[misc]
         @classmethod
@@ -270,13 +283,14 @@ def _loop_type() -> Any:
                         time.sleep(0.05)
             with global_compiler_lock:
                 codegen = self.targetctx.codegen()
-                outer = codegen.create_library, codegen.unserialize_library
+                outer = codegen.create_library, codegen.unserialize_library, NRTContext.get_meminfos
                 codegen.create_library = partial(self.code_type, codegen)
                 codegen.unserialize_library = partial(self.code_type.read, codegen)
+                NRTContext.get_meminfos = counted
                 try:
                     return super().compile(sig)
                 finally:
-                    codegen.create_library, codegen.unserialize_library = outer
+                    codegen.create_library, codegen.unserialize_library, NRTContext.get_meminfos = outer
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)

@@ -36,7 +36,7 @@ def _corrected(
     program.check_shapes(guess)
     x, active = np.empty(program.size), ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
     key, known = np.arange(len(guess.elastic)), guess.elastic.nonzero()[0]
-    rounds = compiled_kernel().grow(program.packed(), key, known, active, _of_all_rows(corrections), room, x)
+    rounds = compiled_kernel().solve(program.packed(), key, known, active, _of_all_rows(corrections), room, x, 0)
     return rounds >= 0, x, active
 
 
@@ -94,8 +94,8 @@ def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[
     x = np.array(start, dtype=float)
     active = ActiveSet(*(np.zeros(size, dtype=bool) for size in (program.size, program.size, len(program.least))))
     program.check_shapes(active)
-    work = np.empty(work_size(program.size, len(program.target), len(program.least)))
-    used = semismooth_kernel().minimise(program.packed(), iterations, CORRECTIONS.tolerance, active, work, x)
+    none, room = np.zeros(0, dtype=np.intp), room_for(program)
+    used = compiled_kernel().solve(program.packed(), none, none, active, CORRECTIONS, room, x, iterations)
     return x, active, used
 
 
@@ -121,14 +121,7 @@ def compiled_kernel(active_set_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     program, active = smallest()
     index = np.zeros(0, dtype=np.intp)
-    active_set_kernel.grow(program, index, index, active, CORRECTIONS, room_for(program), np.zeros(1))
-
-
-@with_loops("wholebody.methods.qp.active_set_kernel")
-def semismooth_kernel(active_set_kernel: Any) -> None:
-    """The module of semismooth Newton steps, compiled or read back: few solves need it, a tracker cannot wait."""
-    program, active = smallest()
-    active_set_kernel.minimise(program, 1, CORRECTIONS.tolerance, active, np.empty(work_size(1, 0, 0)), np.zeros(1))
+    active_set_kernel.solve(program, index, index, active, CORRECTIONS, room_for(program), np.zeros(1), 0)
 
 
 def smallest() -> tuple[QuadraticProgram, ActiveSet]:

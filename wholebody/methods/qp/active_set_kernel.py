@@ -15,7 +15,18 @@ STILL = 1e-13  # rad, m: a step shorter than this is none
 WHOLE = 1e-9  # a step this near to the whole way is the whole way but for rounding
 
 
-@compiled(error_model="numpy", forceinline=True)
+@compiled(error_model="numpy")
+def solve(
+    program: QuadraticProgram, key: Indices, known: Indices, active: ActiveSet, limits: Corrections, room: Room,
+    x: Array, steps: int,
+) -> int:  # fmt: skip
+    """Do what `grow` does, or what `minimise` does where it is to take steps; both share the minimiser on a face."""
+    if steps > 0:
+        return minimise(program, steps, limits.tolerance, active, room, x)
+    return grow(program, key, known, active, limits, room, x)
+
+
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def grow(
     program: QuadraticProgram, key: Indices, known: Indices, active: ActiveSet, limits: Corrections, room: Room,
     x: Array,
@@ -114,15 +125,15 @@ def _correct(
     return found
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def minimise(
-    program: QuadraticProgram, iterations: int, tolerance: float, active: ActiveSet, work: Array, x: Array
+    program: QuadraticProgram, iterations: int, tolerance: float, active: ActiveSet, room: Room, x: Array
 ) -> int:
     """Lower the objective from x (n,), in place, until its minimum, or for so many iterations; returns how many."""
     diagonal, lower, upper = program.diagonal, program.lower, program.upper
     at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
     n, m, k = len(diagonal), len(program.target), len(program.least)
-    own = face(work, n, m, k)
+    own, pushes = face(room.work, n, m, k), room.places
     gradient = own.gradient
     way, end, violated, speed = np.empty(n), np.empty(n), np.empty(k), np.empty(k)
     stack_soft(program, own)
@@ -135,9 +146,13 @@ def minimise(
         at_upper[i] = x[i] >= upper[i] and gradient[i] <= 0.0 and not at_lower[i]
     rough = 1e3 * tolerance  # a face before the last one only says which way to go: half as many in columns
     for used in range(1, iterations + 1):
-        pushes = pushing.nonzero()[0]
-        stack_elastic(program, pushes, own)
-        if not minimise_on_face(program, active, own, m + len(pushes), rough, end):
+        count = 0
+        for j in range(k):
+            if pushing[j]:
+                pushes[count] = j
+                count += 1
+        stack_elastic(program, pushes[:count], own)
+        if not minimise_on_face(program, active, own, m + count, rough, end):
             return used
         for i in range(n):
             way[i] = 0.0 if at_lower[i] or at_upper[i] else end[i] - x[i]

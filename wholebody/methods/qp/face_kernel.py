@@ -67,7 +67,7 @@ def stack_elastic(program: QuadraticProgram, pushes: Indices, own: Face) -> None
         compliance[first + count] = 1.0 / elastic_weight[j]
 
 
-@compiled(inner=True, error_model="numpy", forceinline=True)
+@compiled(inner=True, error_model="numpy")
 def minimise_on_face(
     program: QuadraticProgram, active: ActiveSet, own: Face, size: int, tolerance: float, x: Array
 ) -> bool:

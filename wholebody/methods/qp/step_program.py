@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, brief, with_values
 from wholebody.base.compiled import with_loops
 from wholebody.figures.state import State
-from wholebody.methods.qp.active_set import semismooth_kernel
+from wholebody.methods.qp.active_set import compiled_kernel as compiled_sets
 from wholebody.methods.qp.quadratic_program import (
     NUMBERS,
     QuadraticProgram,
@@ -253,7 +253,7 @@ def numbers_of(scale: float) -> Array:
 def compiled_kernel(tracking_kernel: Any) -> None:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     compiled_turning()
-    semismooth_kernel()
+    compiled_sets()
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     tracking_kernel.solve(
         (none, np.zeros((0, 1)), none, index, none, np.zeros((2, 2)), np.zeros((2, 1)), none, index),

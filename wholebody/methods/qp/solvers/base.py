@@ -99,7 +99,7 @@ class WorkingSet:
         lower, upper = np.zeros((2, program.size), dtype=bool) if self.held is None else self.held.copy()
         active = ActiveSet(lower, upper, np.empty(len(key), dtype=bool))
         program.check_shapes(active)
-        rounds = self._kernel.grow(program, key, self.pushing, active, CORRECTIONS, self.room(program), x)
+        rounds = self._kernel.solve(program, key, self.pushing, active, CORRECTIONS, self.room(program), x, 0)
         return None if rounds < 0 else QPSolution(x, active, True, 0, ACTIVE_SET)
 
     def room(self, program: QuadraticProgram) -> Room:
