@@ -144,13 +144,16 @@ def _forms(*made: type, **given: Kind) -> dict[str, Form]:
     return {re.sub(r"(?<!^)(?=[A-Z])", "_", one.__name__).lower(): _form(one, **given) for one in made}
 
 
-CONTACTS = _forms(tasks.Touch, tasks.Sit, tasks.Grasp) | _forms(tasks.Lean, part=SEGMENT)
-"""Contacts; each is a goal and a constraint, by the table in which it stands."""
+EITHER = {
+    **_forms(tasks.Orientation, tasks.Axis, tasks.CenterOfMass, tasks.Touch, tasks.Sit, tasks.Grasp),
+    **_forms(tasks.Lean, part=SEGMENT),
+}
+"""What is a goal or a constraint by the table in which it stands."""
 
 GOALS = {
-    **_forms(tasks.Point, tasks.Frame, tasks.Orientation, tasks.Axis, tasks.CenterOfMass, tasks.Relative),
+    **_forms(tasks.Point, tasks.Frame, tasks.Relative),
     **_forms(tasks.Posture, target=kinds.POSTURE),
-    **CONTACTS,
+    **EITHER,
 }
 
 SOFT = kind_of(tasks.Soft, "weight")  # what `soft` of a goal takes: the weight of the measure that the goal becomes
@@ -169,7 +172,10 @@ CONSTRAINTS = {
     **_forms(tasks.RangeOfMotion, names=Several(kinds.RANGE)),
     **_forms(ergonomics.LoadedBalance, ergonomics.StrengthLimit, forces=FORCES, strength=STRENGTH),
     **_forms(ergonomics.Look, view=VIEW),
-    **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
+    **{  # a constraint has no weight
+        name: replace(form, keys=tuple(key for key in form.keys if key.name != "weight"))
+        for name, form in EITHER.items()
+    },
 }
 
 MEASURES = {

@@ -23,7 +23,7 @@ from wholebody.base.fields import called
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, filled
+from wholebody.tasks.base import GoalOrConstraint, filled
 
 STEEPEST = pi / sin(pi / 180.0)
 """Largest derivative across the error, reached one degree before the opposite direction.
@@ -38,8 +38,10 @@ TOUCHING = 1e-6  # Distance [m] below which a point has no direction from the fr
 
 
 @dataclass(frozen=True, eq=False)
-class Axis(Goal):
+class Axis(GoalOrConstraint):
     """Turn an axis of a frame into a direction, or point it towards a point; rotation about the axis is free.
+
+    Use it as a goal, or as a constraint that always holds, such as for a tray that stays level.
 
     The error has two rows; its norm is the angle between the axis and the target direction, from 0 to pi [rad]. If the
     axis has exactly the opposite direction, the figure turns about a fixed direction of the frame.

@@ -173,6 +173,16 @@ class Constraint(Rows):
         """(m,) constrained values, in metres and radians."""
 
 
+class GoalOrConstraint(Goal, Constraint):
+    """A goal that holds always where it stands among the constraints: its error is zero. It has no weight there."""
+
+    upper = np.zeros(())
+
+    def value(self, state: State) -> Array:
+        """(m,) the error."""
+        return self.error(state)
+
+
 class ComputedTogether(Constraint):
     """Base of constraints whose values (m,) and rows (m, nv) come from one computation, `value_and_jacobian`."""
 

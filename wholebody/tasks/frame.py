@@ -18,7 +18,7 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Goal, Term, filled
+from wholebody.tasks.base import Constraint, Goal, GoalOrConstraint, Term, filled
 from wholebody.tasks.inputs import WORLD, Place
 
 _FORCES: Array = np.eye(3, 6)
@@ -171,8 +171,8 @@ class Frame(PlacementGoal):
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation(PlacementGoal):
-    """Turn a frame to an orientation; its position is free.
+class Orientation(PlacementGoal, GoalOrConstraint):
+    """Turn a frame to an orientation; its position is free. As a goal, or as a constraint that always holds.
 
     The error is the rotation vector from the target to the frame, in world axes [rad].
 

@@ -12,7 +12,7 @@ from wholebody.base.checks import known, settle
 from wholebody.figures.state import State, Wrench
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Goal, filled
+from wholebody.tasks.base import Constraint, Goal, GoalOrConstraint, filled
 from wholebody.tasks.frame import point_rows
 
 
@@ -59,8 +59,8 @@ class Point(Goal):
 
 
 @dataclass(frozen=True, eq=False)
-class CenterOfMass(Goal):
-    """Move the figure's centre of mass to a position, or above one.
+class CenterOfMass(GoalOrConstraint):
+    """Move the figure's centre of mass to a position, or above one; as a goal, or as a constraint that always holds.
 
     The error is the centre of mass minus the target, in world axes [m]. What is fixed to the world does not count.
 

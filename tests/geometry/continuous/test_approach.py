@@ -13,10 +13,14 @@ import wholebody as wb
 
 SLIDING = (
     '<robot name="r"><link name="a">{ball}</link><link name="b">{ball}</link><link name="c">{ball}</link>'
+    '<link name="d">{ball}</link>'
     '<joint name="s" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>'
     '<limit lower="-0.2" upper="0.3" effort="1" velocity="3"/></joint>'
     '<joint name="t" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>'
-    '<limit lower="-1" upper="1" effort="1" velocity="3"/><mimic joint="s" multiplier="2"/></joint></robot>'
+    '<limit lower="-1" upper="1" effort="1" velocity="3"/><mimic joint="s" multiplier="2"/></joint>'
+    '<joint name="u" type="prismatic"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/><axis xyz="1 0 0"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="3"/><mimic joint="s" multiplier="-1.5" offset="0.1"/></joint>'
+    "</robot>"
 ).format(ball='<collision><geometry><box size="0.1 0.2 0.05"/></geometry></collision>')
 
 
@@ -43,6 +47,7 @@ def test_no_pair_comes_nearer_than_the_bound_says(name: str, root: Path, tmp_pat
     workspace = scene.workspace()
     bound = workspace.largest_approach(most)
     each = workspace.largest_approach(np.diag(most))  # of a motion of each freedom alone
+    assert np.isfinite(bound).all()
     assert (each.sum(axis=1) >= bound - 1e-12).all()
     assert (each <= bound[:, None] + 1e-12).all()
     tightest, distances = np.inf, asker(scene)

@@ -192,9 +192,13 @@ def _length(model: pin.Model, joint: int) -> float:
     length = float(np.linalg.norm(model.jointPlacements[joint].translation))
     if not _axes(model, kind)[:3].any():
         return length
-    if kind.nq != 1:
+    if next(one.nq for one in model.joints if one.nq and one.idx_q == kind.idx_q) != 1:  # its own, or of whom it follows
         return np.inf
-    return length + float(max(abs(model.lowerPositionLimit[kind.idx_q]), abs(model.upperPositionLimit[kind.idx_q])))
+    ends = np.array((model.lowerPositionLimit[kind.idx_q], model.upperPositionLimit[kind.idx_q]))
+    if kind.nq == 0:
+        law = kind.extract()
+        ends = law.scaling * ends + law.offset
+    return length + float(np.abs(ends).max())
 
 
 def _axes(model: pin.Model, joint: Any) -> Array:

@@ -14,6 +14,7 @@ from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError, named_terms
 from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
+from wholebody.tasks.base import Goal
 from wholebody.tasks.frame import PlacementResidual
 from wholebody.tasks.inputs import Place
 
@@ -126,8 +127,10 @@ def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
             none = np.zeros((0, robot.wrapper.model.nq))
             own.balances.append((solver.add_joint_space_half_spaces_constraint(none, np.zeros(0)), term))
             own.balances[-1][0].configure(f"constraint {number}", "hard", 1.0)
-        elif isinstance(term, tasks.Hold):
+        elif isinstance(term, (tasks.Hold, tasks.Orientation)):
             own.holds.append((*_placement(solver, term.residual), f"constraint {number}"))
+        elif isinstance(term, Goal):
+            _goal(solver, robot, problem, f"constraint {number}", term, "hard")
         else:
             _constraint(solver, f"constraint {number}", term)
     for bound in problem.bounds:
@@ -141,13 +144,13 @@ def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
     return own
 
 
-def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> None:
+def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any, priority: str = "soft") -> None:
     if isinstance(goal, tasks.Posture):
         _posture(solver, robot, problem, name, goal)
         return
     if isinstance(goal, (tasks.Frame, tasks.Orientation, tasks.Relative)):
         task, weights = _placement(solver, goal.residual)
-        task.configure(name, "soft", *[goal.weight] * weights)
+        task.configure(name, priority, *[goal.weight] * weights)
         return
     if isinstance(goal, tasks.Point):
         task = solver.add_position_task(_name(goal.place, goal.resolved_offset), np.array(goal.resolved_target))
@@ -156,7 +159,7 @@ def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> 
     else:
         task = solver.add_com_task(np.array((*goal.resolved_target, 0.0)[:3]))
         task.mask.set_axises(goal.axes, "task")
-    task.configure(name, "soft", goal.weight)
+    task.configure(name, priority, goal.weight)
 
 
 def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: tasks.Posture) -> None:
