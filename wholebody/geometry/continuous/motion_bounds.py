@@ -192,7 +192,8 @@ def _length(model: pin.Model, joint: int) -> float:
     length = float(np.linalg.norm(model.jointPlacements[joint].translation))
     if not _axes(model, kind)[:3].any():
         return length
-    if next(one.nq for one in model.joints if one.nq and one.idx_q == kind.idx_q) != 1:  # its own, or of whom it follows
+    size = next(one.nq for one in model.joints if one.nq and one.idx_q == kind.idx_q)  # its own, or of whom it follows
+    if size != 1:
         return np.inf
     ends = np.array((model.lowerPositionLimit[kind.idx_q], model.upperPositionLimit[kind.idx_q]))
     if kind.nq == 0:
