@@ -98,3 +98,29 @@ def test_ways_end_within_the_tolerance_of_limits_however_often_they_lead_out() -
     points = Points.room(0, model.nv, [], None).with_limits(model, single, q, np.full(model.nv, np.inf))
     assert points.share(-way) == 1.0
     assert points.share(way) < 1e-9
+
+
+@pytest.mark.parametrize("shots", [0, 12])  # that hit the body a little before, and are taken together
+def test_what_passes_by_a_head_is_not_hit_by_the_plane_at_its_nearest_place(shots: int) -> None:
+    figure = wb.load("avatar")
+    q, speed = figure.posture("standing"), 40.0
+    top, pelvis = (figure.placement(q, name).translation for name in ("head_top", "pelvis"))
+    scene = wb.Scene(figure)
+    for k in range(shots):
+        at = pelvis + (0.35 + 0.03 * k, 0.05 * (-1) ** k, 0.03 * (k % 4))
+        scene.add(wb.Sphere(0.01), name=f"shot {k}", at=at, body=wb.Body(mass=0.02, velocity=(-speed, 0.0, 0.0)))
+    at = top + (0.96, 0.0, 0.022)  # it passes 2 mm above, and falls as the figure does
+    scene.add(wb.Sphere(0.02), name="ball", at=at, body=wb.Body(mass=0.1, velocity=(-speed, 0.0, 0.0)))
+    world = wb.World(scene, q, spring=wb.Actuated(figure, dict.fromkeys(figure.joints, 200.0)))
+    for _ in range(3):
+        world.step()
+    assert world.engine is not None
+    assert world.engine.twist("ball")[:3] == pytest.approx((-speed, 0.0, -9.81 * world.time), abs=0.05)  # 11 m/s off
+
+
+def test_a_frame_ends_at_its_end_where_a_limb_turned_fast_before(hand: wb.Figure) -> None:
+    """It is divided into steps of the engine, which may be longer than it: its last step was."""
+    moving = Articulated(wb.Scene(hand), hand.neutral, wb.Actuated(hand), None)
+    moving._turning = 200.0  # rad/s, until something stopped it
+    moving.advance(hand.neutral, 1e-3, {}, {})
+    assert moving.ends == pytest.approx([1e-3])  # it was four times as long

@@ -76,3 +76,26 @@ def test_a_step_does_not_end_inside_what_was_far_away_when_it_began(tmp_path: Pa
         q = fitter.careful_step(q, goals, None)
         assert fitter.depth(q) < 5e-4
     assert q[0] == pytest.approx(0.04 / 0.5, abs=0.01)  # it stops before the block, and is not pushed through
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_a_plate_is_kept_above_tiles_however_many_are_as_near(tmp_path: Path, count: int) -> None:
+    """Of more pairs than freedoms none was kept where all are as near as the nearest."""
+    (path := tmp_path / "plate.urdf").write_text(
+        """<robot name="plate"><link name="base"/><link name="tip">
+        <collision><geometry><box size="1 0.2 0.02"/></geometry></collision></link>
+        <joint name="slide" type="prismatic"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    )
+    figure = wb.load(path)
+    scene = wb.Scene(figure)
+    for k in range(count):
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name=f"tile {k}", at=(0.15 * k - 0.3, 0.0, -0.062))  # 2 mm below it
+    layout = Layout([], [], np.zeros((0, 0)), np.zeros(0), np.zeros(0), [HeldPoint("left_wrist", "", 1, np.zeros(3))])
+    below = np.array([[0.0, 0.0, -0.04]])
+    goals = Goals(
+        np.zeros((0, 3)), np.zeros((0, 3, 3)), below, np.full((1, 3), 1.0), figure.neutral, np.zeros(1),
+    )  # fmt: skip
+    with scene.borrow() as workspace:
+        fitter = Fitter(figure, layout, workspace)
+        assert fitter.depth(fitter.step(figure.neutral, goals)) < 1e-3

@@ -43,13 +43,13 @@ def _ball_mesh(path: Path) -> str:
     return f'<mesh filename="{path}"/>'
 
 
-def _quadruped(folder: Path, ball: str) -> wb.Figure:
+def _quadruped(folder: Path, ball: str, at: str = "0 0 0") -> wb.Figure:
     parts = [_link("trunk", 10.0, '<box size="0.7 0.3 0.12"/>')]
     for leg, (x, y) in LEGS.items():
         parts += [_link(f"{leg}_hip", 0.5, '<sphere radius="0.04"/>')]
         parts += [_link(f"{leg}_thigh", 1.0, '<cylinder radius="0.02" length="0.2"/>', "0 0 -0.15")]
         parts += [_link(f"{leg}_shank", 0.5, '<cylinder radius="0.015" length="0.2"/>', "0 0 -0.14")]
-        parts += [_link(f"{leg}_foot", 0.1, ball)]
+        parts += [_link(f"{leg}_foot", 0.1, ball, at)]
         parts += [_joint(f"{leg}_haa", "trunk", f"{leg}_hip", f"{x} {y} -0.1", "1 0 0")]
         parts += [_joint(f"{leg}_hfe", f"{leg}_hip", f"{leg}_thigh", "0 0 0", "0 1 0")]
         parts += [_joint(f"{leg}_kfe", f"{leg}_thigh", f"{leg}_shank", "0 0 -0.3", "0 1 0")]
@@ -89,6 +89,17 @@ def test_the_balance_of_balls_is_over_the_points_on_which_they_stand(tmp_path: P
     balance = wb.Balance(FEET).resolve(scene, robot.grounded(robot.neutral, scene))
     found = sorted(map(tuple, np.column_stack([balance.normals, balance.offsets]).round(2)))
     assert found == [(-1.0, 0.0, -0.3), (0.0, -1.0, -0.2), (0.0, 1.0, -0.2), (1.0, 0.0, -0.3)]
+
+
+@pytest.mark.parametrize("lean", [0.5, 0.8, 1.2])  # rad
+def test_feet_that_are_capsules_that_lean_stand_on_their_lower_ends(tmp_path: Path, lean: float) -> None:
+    # Turned by 60 degrees they stand on the upper ends: they were balls between both, and 4 cm beside the lower ones.
+    robot = _quadruped(tmp_path, '<capsule radius="0.02" length="0.2"/>', f'0 0 0" rpy="0 {lean} 0')
+    scene = wb.Scene(robot).add(wb.HalfSpace(), name="floor")
+    balance = wb.Balance(FEET).resolve(scene, robot.grounded(robot.neutral, scene))
+    found = dict(zip(map(tuple, balance.normals.round(6) + 0.0), balance.offsets, strict=True))
+    assert found[1.0, 0.0] == pytest.approx(-0.3 - 0.1 * np.sin(lean), abs=1e-6)
+    assert found[-1.0, 0.0] == pytest.approx(-0.3 + 0.1 * np.sin(lean), abs=1e-6)
 
 
 def test_soles_are_level_of_a_robot_whose_zero_overlaps(tmp_path: Path) -> None:

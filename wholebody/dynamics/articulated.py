@@ -149,7 +149,7 @@ class Articulated:
         """Advance by at most a time, to the next impact if that comes first; by how much."""
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
-        most, again = STEP if self._turning * time > FAR else time, False
+        most, again = min(STEP, time) if self._turning * time > FAR else time, False
         while True:
             done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]
@@ -250,8 +250,8 @@ class Articulated:
 
     def _until_impact(self, points: Points, time: float) -> float:
         """The time to the first impact if that comes within a time."""
-        speed = self._relative(points)[::3]
-        coming = (points.restitution * speed < -BOUNCE) & (points.gap - SKIN > self._soon * -speed)
+        speed = (relative := self._relative(points))[::3]
+        coming = (points.restitution * speed < -BOUNCE) & ~points.met(relative, SKIN, SHORTEST, self._soon)
         first = float(((points.gap[coming] - SKIN) / -speed[coming]).min(initial=time))
         self._soon += SHORTEST if first < time else 0.0  # of many impacts in a frame the later ones are taken together
         return min(max(first, SHORTEST), time)
@@ -259,7 +259,7 @@ class Articulated:
     def _bounce(self, inertia: Array, points: Points) -> Array:
         speed = self._relative(points)
         approach = speed[::3]
-        hit = (points.restitution * approach < -BOUNCE) & (points.gap - SKIN <= self._soon * np.abs(approach))
+        hit = (points.restitution * approach < -BOUNCE) & points.met(speed, SKIN, SHORTEST, self._soon)
         target = np.where(hit, -points.restitution * approach, -np.inf)
         target = np.where((points.gap <= 2.0 * SKIN) & ~hit, 0.0, target)  # what is pressed together passes the blow on
         if not hit.any():

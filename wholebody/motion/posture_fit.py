@@ -196,7 +196,8 @@ class Fitter:
         contacts, missing = [np.zeros((0, len(lower)))], [np.zeros(0)]
         if near is not None and len(near.distance):
             if len(near.distance) > len(lower):  # of more rows, see below, none of a farther pair is kept
-                near = near.nearer(float(np.partition(near.distance, len(lower))[len(lower)]))
+                farthest = float(np.partition(near.distance, len(lower))[len(lower)])
+                near = near.nearer(np.nextafter(farthest, np.inf))  # of a floor of tiles many are as near
             found = self._workspace.rows.rows(near, CLEARANCE)
             contacts.append(self._state.rows(found.wrench, found.second, found.first))
             missing.append(np.minimum(CLEARANCE - found.gap, PUSH))

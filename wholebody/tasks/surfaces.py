@@ -293,6 +293,9 @@ def ball_under(bears: Surface, rest: State) -> Ball | None:
         return None
     radius = float(large.mean() / (2.0 * np.sin(tilts[3])))
     center = lowest[[0, 3]].mean(axis=(0, 1)) + (0.0, 0.0, radius * np.cos(tilts[3]))
+    off = float(np.linalg.norm(lowest - center - radius * under, axis=2).mean())
+    if off > 0.5 * radius + POINT:  # hulls have up to 0.3; a capsule that leans, whose ends are two balls, 0.8
+        return None
     joint = bears.joints[0]
     return Ball(np.asarray(rest.data.oMi[joint].actInv(center)), radius, joint)
 

@@ -421,6 +421,15 @@ def test_an_archive_of_a_person_along_y_stands_too_and_its_unit_is_metres(tmp_pa
         wb.motion.read_skeleton(path, unit="inches")
 
 
+def test_who_lies_on_the_floor_of_an_archive_with_the_feet_at_its_origin_lies(tmp_path: Path) -> None:
+    path = amass(tmp_path / "a.npz", poses=np.zeros((7, 156)), trans=np.tile([0.0, 1.15, 0.12], (7, 1)))
+    found = wb.motion.read_skeleton(path)
+    assert "y is up" not in found.notes
+    at = dict(zip(found.names, found.positions[0], strict=True))
+    assert at["head"][1] > at["left_ankle"][1] + 1.3
+    assert 0.02 < found.positions[:, :, 2].min() < found.positions[:, :, 2].max() < 0.4  # on the back
+
+
 @pytest.mark.parametrize(("columns", "model", "down"), [(72, None, 0.22), (156, "smplh", 0.22), (165, None, 0.35)])
 def test_a_body_of_amass_turns_about_its_pelvis_beside_the_place_of_the_archive(
     tmp_path: Path, columns: int, model: str | None, down: float

@@ -55,13 +55,19 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     root, notes = places + PELVIS["smplx" if whole else "smpl"], ["lengths of bones are those of an average body"]
     try:
         made = partial(SkeletonMotion.moved, names, parents, offsets @ TEMPLATE.T, dt=1.0 / frequency)
-        if up is None and stands_along(made(local=local, root=root), 1):
+        if up is None and _stands_along_y(made(local=local, root=root)):
             up, notes = "y", [*notes, "y is up"]
         if up == "y":
             local[:, 0], root = UP["y"] @ local[:, 0], root @ UP["y"].T
         return made(local=local, root=root, name=title_of(path), notes=tuple(notes))
     except InputError as error:
         raise FileFormatError(f"{name}: {error}") from None
+
+
+def _stands_along_y(motion: SkeletonMotion) -> bool:
+    """Whether a person stands along y and does not lie on the floor z = 0, above which joints are 2 to 20 cm, m."""
+    lowest = motion.positions[:, :, 2].min(axis=1)
+    return stands_along(motion, 1) and not (lowest.min() > 0.02 and lowest.max() < 0.2)
 
 
 def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, float]:
