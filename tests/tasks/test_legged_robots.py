@@ -107,7 +107,9 @@ def test_shanks_that_are_never_upright_stand_on_their_feet(tmp_path: Path, knee:
     nearest = np.linalg.norm(points[:, None, :2] - middles[:, :2], axis=2).argmin(axis=1)
     for number, middle in enumerate(middles):
         own = points[nearest == number]
-        np.testing.assert_allclose(own[own[:, 2].argmin()], middle - (0.0, 0.0, RADIUS), atol=6e-3 if one_piece else 1e-9)
+        np.testing.assert_allclose(
+            own[own[:, 2].argmin()], middle - (0.0, 0.0, RADIUS), atol=6e-3 if one_piece else 1e-9
+        )
 
 
 def test_soles_are_level_of_a_robot_whose_zero_overlaps(tmp_path: Path) -> None:
