@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.tasks.balance import standing_points
 
 RADIUS = 0.03
 LEGS = {"lf": (0.3, 0.2), "rf": (0.3, -0.2), "lh": (-0.3, 0.2), "rh": (-0.3, -0.2)}
@@ -22,13 +23,13 @@ def _link(name: str, mass: float, shape: str, at: str = "0 0 0") -> str:
 <collision><origin xyz="{at}"/><geometry>{shape}</geometry></collision></link>"""
 
 
-def _joint(name: str, parent: str, child: str, at: str, axis: str, kind: str = "revolute") -> str:
+def _joint(name: str, parent: str, child: str, at: str, axis: str, kind: str = "revolute", most: float = 2.5) -> str:
     return f"""<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>
-<axis xyz="{axis}"/><limit lower="-2.5" upper="2.5" effort="99" velocity="9"/></joint>"""
+<axis xyz="{axis}"/><limit lower="-2.5" upper="{most}" effort="99" velocity="9"/></joint>"""
 
 
-def _ball_mesh(path: Path) -> str:
-    """A ball of the feet's radius as a mesh of 66 corners: an octahedron whose faces are split twice."""
+def _ball_mesh(path: Path, knee: tuple[float, ...] = ()) -> str:
+    """A ball of the feet's radius as a mesh of 66 corners: an octahedron whose faces are split twice; and a corner."""
     faces = [np.array([(x, 0, 0), (0, y, 0), (0, 0, z)]) for x in (1, -1) for y in (1, -1) for z in (1, -1)]
     faces = [face if np.linalg.det(face) > 0.0 else face[::-1] for face in faces]
     for _ in range(2):
@@ -38,12 +39,14 @@ def _ball_mesh(path: Path) -> str:
             split += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
         faces = [np.array([corner / np.linalg.norm(corner) for corner in face]) for face in split]
     lines = [f"v {x} {y} {z}" for x, y, z in RADIUS * np.concatenate(faces)]
+    lines += [f"v {' '.join(map(str, knee))}"] if knee else []
     lines += [f"f {k} {k + 1} {k + 2}" for k in range(1, 3 * len(faces), 3)]
+    lines += [f"f 1 2 {3 * len(faces) + 1}"] if knee else []
     path.write_text("\n".join(lines))
     return f'<mesh filename="{path}"/>'
 
 
-def _quadruped(folder: Path, ball: str, at: str = "0 0 0") -> wb.Figure:
+def _quadruped(folder: Path, ball: str, at: str = "0 0 0", most: float = 2.5) -> wb.Figure:
     parts = [_link("trunk", 10.0, '<box size="0.7 0.3 0.12"/>')]
     for leg, (x, y) in LEGS.items():
         parts += [_link(f"{leg}_hip", 0.5, '<sphere radius="0.04"/>')]
@@ -52,7 +55,7 @@ def _quadruped(folder: Path, ball: str, at: str = "0 0 0") -> wb.Figure:
         parts += [_link(f"{leg}_foot", 0.1, ball, at)]
         parts += [_joint(f"{leg}_haa", "trunk", f"{leg}_hip", f"{x} {y} -0.1", "1 0 0")]
         parts += [_joint(f"{leg}_hfe", f"{leg}_hip", f"{leg}_thigh", "0 0 0", "0 1 0")]
-        parts += [_joint(f"{leg}_kfe", f"{leg}_thigh", f"{leg}_shank", "0 0 -0.3", "0 1 0")]
+        parts += [_joint(f"{leg}_kfe", f"{leg}_thigh", f"{leg}_shank", "0 0 -0.3", "0 1 0", most=most)]
         parts += [_joint(f"{leg}_end", f"{leg}_shank", f"{leg}_foot", "0 0 -0.3", "0 0 1", "fixed")]
     path = folder / "quadruped.urdf"
     path.write_text(f'<robot name="quadruped">{"".join(parts)}</robot>')
@@ -100,6 +103,24 @@ def test_feet_that_are_capsules_that_lean_stand_on_their_lower_ends(tmp_path: Pa
     found = dict(zip(map(tuple, balance.normals.round(6) + 0.0), balance.offsets, strict=True))
     assert found[1.0, 0.0] == pytest.approx(-0.3 - 0.1 * np.sin(lean), abs=1e-6)
     assert found[-1.0, 0.0] == pytest.approx(-0.3 + 0.1 * np.sin(lean), abs=1e-6)
+
+
+@pytest.mark.parametrize("knee", ["bent", "of one piece with the foot"])
+def test_shanks_that_are_never_upright_stand_on_their_feet(tmp_path: Path, knee: str) -> None:
+    """Knees that stay bent, as those of most quadrupeds: tilted by 60 degrees, a knee may be lower than its foot."""
+    one_piece = knee != "bent"
+    ball = _ball_mesh(tmp_path / "ball.obj", (0.15, 0.0, 0.06)) if one_piece else f'<sphere radius="{RADIUS}"/>'
+    robot = _quadruped(tmp_path, ball, most=2.5 if one_piece else -0.9)
+    legs = {f"{leg}_hfe": 0.7 for leg in LEGS} | {f"{leg}_kfe": -1.4 for leg in LEGS}
+    start = robot.neutral if one_piece else robot.with_joints(robot.neutral, legs)
+    points = standing_points(wb.Scene(robot), start, FEET)
+    middles = np.array([robot.placement(start, foot).translation for foot in FEET])
+    nearest = np.linalg.norm(points[:, None, :2] - middles[:, :2], axis=2).argmin(axis=1)
+    for number, middle in enumerate(middles):
+        own = points[nearest == number]
+        np.testing.assert_allclose(
+            own[own[:, 2].argmin()], middle - (0.0, 0.0, RADIUS), atol=6e-3 if one_piece else 1e-9
+        )
 
 
 def test_soles_are_level_of_a_robot_whose_zero_overlaps(tmp_path: Path) -> None:

@@ -282,19 +282,23 @@ def ball_under(bears: Surface, rest: State) -> Ball | None:
     angles = np.radians(np.arange(0.0, 180.0, 15.0))
     along = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
     under = np.sin(tilts)[:, None, None] * along - np.cos(tilts)[:, None, None] * np.array((0.0, 0.0, 1.0))
-    lowest = np.empty_like(under)
-    for index in np.ndindex(under.shape[:2]):
-        pieces = zip(bears.shapes, places, bears.swept, strict=True)
-        found = np.vstack([outermost(shape, place, under[index], swept) for shape, place, swept in pieces])
-        lowest[index] = found[np.argmax(found @ under[index])]
+    points = np.empty((len(places), *under.shape))
+    for number, piece in enumerate(zip(bears.shapes, places, bears.swept, strict=True)):
+        for index in np.ndindex(under.shape[:2]):
+            found = np.atleast_2d(outermost(*piece[:2], under[index], piece[2]))
+            points[number][index] = found[np.argmax(found @ under[index])]
+    depths = (points * under).sum(axis=3)
+    bearing = np.unique(depths[:, 1:3].argmax(axis=0))  # tilted by 60 degrees, a shank may be lower than its foot
+    points, depths = points[bearing], depths[bearing]
+    lowest = np.take_along_axis(points, depths.argmax(axis=0)[None, :, :, None], axis=0)[0]
     little, large = (((lowest[k] - lowest[3 - k]) * along).sum(axis=1) for k in (2, 3))
     share = little / np.maximum(large, POINT)
     if share.max() > 0.67:  # spheres have 0.2, hulls of 48 corners up to 0.56, soles 0.78 to 1, wheels 1 along the axle
         return None
     radius = float(large.mean() / (2.0 * np.sin(tilts[3])))
     center = lowest[[0, 3]].mean(axis=(0, 1)) + (0.0, 0.0, radius * np.cos(tilts[3]))
-    off = float(np.linalg.norm(lowest - center - radius * under, axis=2).mean())
-    if off > 0.5 * radius + POINT:  # hulls have up to 0.3; a capsule that leans, whose ends are two balls, 0.8
+    # of the radius: hulls of balls are nearer by up to 0.18, fingers and shanks of one piece with their foot by 0.3
+    if np.abs(depths.max(axis=0) - under @ center - radius).max() > 0.25 * radius:
         return None
     joint = bears.joints[0]
     return Ball(np.asarray(rest.data.oMi[joint].actInv(center)), radius, joint)

@@ -18,7 +18,7 @@ from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.qp import chain_goals_kernel
 from wholebody.methods.qp.chain import from_seeds
-from wholebody.methods.qp.chain_problem import chains_of, goal_entries
+from wholebody.methods.qp.chain_problem import Asked, chains_of, goal_entries, how_far
 from wholebody.methods.qp.plain_chain import Chains, PlainChain
 from wholebody.methods.qp.settings import Settings
 from wholebody.tasks.base import Goal
@@ -143,6 +143,28 @@ def test_steps_are_those_of_the_textbook_method(arm, two_arms, turned):
                 stopped += bool(np.isin(q, (*figure.limits.lower, *figure.limits.upper)).any())
                 np.testing.assert_allclose(q, textbook.q, atol=1e-9)
     assert stopped > 0, "some steps end at limits"
+
+
+def test_inequalities_that_are_met_all_the_way_change_no_descent(arm):
+    """Also where joints are stopped at their limits: what these miss is no error of a row that does not count."""
+    rng = np.random.default_rng(0)
+    lower, upper = arm.model.lowerPositionLimit, arm.model.upperPositionLimit
+    ground = wb.Plane("tip", (0, 0, 1), point=(0.0, 0.0, -9.0), side="above")
+    for _ in range(40):
+        goals, start = [random_goal(arm, "tip", rng, False)], rng.uniform(lower, upper)
+        ends = []
+        for constraints in ([], [ground]):
+            problem = wb.Problem(wb.Scene(arm), start, goals=goals, constraints=constraints)
+            entries, end = goal_entries(problem), start[None, None].copy()
+            with chains_of(problem).borrow() as chains:
+                chain = chains.carrying(entries)
+                asked = Asked.by(problem, chain, entries, None)
+                assert len(asked.goals.one_sided) == 3 + len(constraints)
+                chain.descents(
+                    asked.goals.tables[None], asked.goals, np.zeros((1, 2, 6)), how_far(Settings(), 1), end, 1
+                )
+            ends.append(end[0, 0])
+        np.testing.assert_allclose(*ends, atol=1e-9)
 
 
 def test_what_is_found_is_at_the_goal_to_rounding(arm):

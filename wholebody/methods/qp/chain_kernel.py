@@ -127,7 +127,7 @@ def _descend(
             damped = damping
             for r in range(rows):
                 right[r] = -room.value[r]
-                for i in range(size):
+                for i in range(size if room.active[r] else 0):
                     if not room.free[i]:
                         right[r] -= room.jacobian[r, i] * dq[i]
                 damped += 0.5 * right[r] * right[r]
