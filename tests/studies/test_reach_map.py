@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
 from wholebody.cli.main import main
-from wholebody.studies.reach_result import BEYOND, INSIDE, REACHED
+from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, REACHED
 
 PLANAR = """<robot name="planar"><link name="base"/>
 <link name="upper"><collision><origin xyz="0.2 0 0"/><geometry><sphere radius="0.02"/></geometry></collision></link>
@@ -155,3 +156,19 @@ def test_what_one_of_the_two_branches_reaches_is_reached(planar: wb.Problem) -> 
             q = np.array([(first + np.pi) % (2.0 * np.pi) - np.pi, second])
             free |= bool(figure.within_limits(q)) and not scene.penetration(q)
         assert found.reached[tuple(place)] == free, (x, y)
+
+
+def test_no_place_is_left_out_that_is_reached(root: Path) -> None:
+    # A descent to a place beside missed it by 0.5 m, and places within that distance were left out.
+    arm, rng = wb.load(str(root / "tests/data/arm/arm.urdf")), np.random.default_rng(0)
+    scene = wb.Scene(arm)
+    for number in range(6):
+        size, at = rng.uniform(0.2, 0.5, 3), rng.uniform((-0.9, -0.9, 0.0), (0.9, 0.9, 1.2))
+        scene.add(wb.Box(tuple(size)), name=f"box {number}", at=tuple(at))
+    start = arm.neutral
+    while scene.penetration(start):
+        start = arm.clamp(pin.integrate(arm.model, arm.neutral, rng.uniform(-1.5, 1.5, arm.model.nv)))
+    found = wb.reach_map(wb.Problem(scene, start), "tool", (-1.0, -1.0, 0.1), (1.0, 1.0, 1.3), 0.25)
+    for place in np.argwhere(found.verdict == EXCLUDED).tolist():
+        at = found.x[place[0]], found.y[place[1]], found.z[place[2]]
+        assert not wb.solve(wb.Problem(scene, start, goals=[wb.Point("tool", at)]), "qp").solved, at

@@ -18,6 +18,7 @@ from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method, check_problem
 from wholebody.methods.contradictions import contradictions
+from wholebody.methods.qp.chain import takes_seeds
 from wholebody.methods.qp.method import QP
 from wholebody.methods.simplification import beyond_reach
 from wholebody.methods.solve import as_method, warn_of_left_out
@@ -76,8 +77,9 @@ class Asked:
                 return Try(search.place, search.begin, False, True, 0.0, False, 0.0, problem.start)
         solution = (self.whole if search.begin < 0 else self.quick).solve(problem)
         judged = solution.assessment
-        # only where the place is the only goal its residual is its distance from the reach
-        sure = not self.problem.goals and solution.status == "unreachable"
+        # Only where the place is the only goal its residual is its distance from the reach; of an arm, which may reach a
+        # place beside in another configuration, every place is searched from seeds.
+        sure = not self.problem.goals and solution.status == "unreachable" and not takes_seeds(problem)
         return Try(
             search.place, search.begin, solution.solved, False, judged.goal_errors[-1], sure, judged.measure,
             np.asarray(solution.q),
@@ -136,11 +138,12 @@ def reach_map(
 ) -> ReachMap:
     """Find which places of a grid a point of a frame can reach, with everything that a problem asks.
 
-    Each place is solved from the posture of a reached neighbour. What is provably out of reach is not searched: places
-    beyond the lengths of the limbs from what is held, places inside of things, and places within the distance by which
-    a search of another place missed. The answer is the same whatever `jobs` is. A place counts as reached only with a
-    posture that the assessment of `wb.solve` accepts; a place counts as missed after local searches, so that a way in
-    between things that no neighbour leads to may be overlooked.
+    Each place is solved from the posture of a reached neighbour, for chains from seeds too. Not searched are places
+    beyond the lengths of the limbs from what is held, places inside of things, and, of figures that are no chain, places
+    within the distance by which a search of another place missed, unless a place beside is reached. The answer is the
+    same whatever `jobs` is. A place counts as reached only with a posture that the assessment of `wb.solve` accepts; a
+    place counts as missed after local searches, so that a way in between things that no neighbour leads to may be
+    overlooked.
 
     Args:
         problem: figure, things, start, constraints; its goals are met at every place too.
@@ -307,7 +310,8 @@ class _Search:
         centers = np.array([places[place] for place in self._balls]).reshape(-1, 3)
         radii = np.array(list(self._balls.values()))
         free = np.flatnonzero(np.isin(self._verdict, (NOT_TRIED, EXCLUDED)))
-        out = covered(places[free], centers, radii)
+        # a descent may have missed by too much: what is beside a reached place is searched from there
+        out = covered(places[free], centers, radii) & (self._grid.beside(self._verdict == REACHED)[free] == 0)
         self._verdict[free] = np.where(out, EXCLUDED, NOT_TRIED)
         for place in free[out].tolist():
             near = radii - np.linalg.norm(centers - places[place], axis=1)

@@ -88,6 +88,15 @@ def closed_form_postures(problem: Problem, most: int) -> tuple[Array, bool]:
         return found, every
 
 
+def takes_seeds(problem: Problem) -> bool:
+    """Whether the goals and equalities of a problem are those of a chain, which is searched from seeds."""
+    entries = goal_entries(problem)
+    if entries is None:
+        return False
+    with chains_of(problem).borrow() as chains:
+        return chains.carrying(entries) is not None
+
+
 class Descents:
     """Descents of one problem from one batch of seeds after the other."""
 
