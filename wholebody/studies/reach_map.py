@@ -77,8 +77,8 @@ class Asked:
                 return Try(search.place, search.begin, False, True, 0.0, False, 0.0, problem.start)
         solution = (self.whole if search.begin < 0 else self.quick).solve(problem)
         judged = solution.assessment
-        # Only where the place is the only goal its residual is its distance from the reach; of an arm, which may reach a
-        # place beside in another configuration, every place is searched from seeds.
+        # Only where the place is the only goal its residual is its distance from the reach. An arm may reach a place
+        # beside in another configuration: there every place is searched from seeds.
         sure = not self.problem.goals and solution.status == "unreachable" and not takes_seeds(problem)
         return Try(
             search.place, search.begin, solution.solved, False, judged.goal_errors[-1], sure, judged.measure,
@@ -139,9 +139,9 @@ def reach_map(
     """Find which places of a grid a point of a frame can reach, with everything that a problem asks.
 
     Each place is solved from the posture of a reached neighbour, for chains from seeds too. Not searched are places
-    beyond the lengths of the limbs from what is held, places inside of things, and, of figures that are no chain, places
-    within the distance by which a search of another place missed, unless a place beside is reached. The answer is the
-    same whatever `jobs` is. A place counts as reached only with a posture that the assessment of `wb.solve` accepts; a
+    beyond the lengths of the limbs from what is held, places inside of things, and, of figures that are no chain,
+    places within the distance by which a search of another place missed, unless a place beside is reached. The answer
+    is the same whatever `jobs` is. A place counts as reached only with a posture that the assessment of `wb.solve` accepts; a
     place counts as missed after local searches, so that a way in between things that no neighbour leads to may be
     overlooked.
 
