@@ -140,10 +140,10 @@ def reach_map(
 
     Each place is solved from the posture of a reached neighbour, for chains from seeds too. Not searched are places
     beyond the lengths of the limbs from what is held, places inside of things, and, of figures that are no chain,
-    places within the distance by which a search of another place missed, unless a place beside is reached. The answer
-    is the same whatever `jobs` is. A place counts as reached only with a posture that the assessment of `wb.solve` accepts; a
-    place counts as missed after local searches, so that a way in between things that no neighbour leads to may be
-    overlooked.
+    places within the distance by which a search of another place missed, unless a place beside is reached. The
+    answer is the same whatever `jobs` is. A place counts as reached only with a posture that the assessment of
+    `wb.solve` accepts; a place counts as missed after local searches, so that a way in between things that no
+    neighbour leads to may be overlooked.
 
     Args:
         problem: figure, things, start, constraints; its goals are met at every place too.
