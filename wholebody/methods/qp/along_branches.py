@@ -26,8 +26,8 @@ class Look(NamedTuple):
     gap: float  # m: least distance of a pair beyond its clearance, where negative of one pair
 
 
-class Along(NamedTuple):
-    """What a problem asks of an arm of seven joints."""
+class Nearby(NamedTuple):
+    """What a problem asks of a chain, of which postures of less effort are sought."""
 
     chain: PlainChain
     goals: Goals
@@ -37,6 +37,18 @@ class Along(NamedTuple):
     within: float  # m: the largest of them
     workspace: Workspace
     asked: Array  # (5,) see `chain_kernel.reach`
+
+    def descended(self, goals: Goals, values: Array) -> tuple[Array, Array]:
+        """The end (n,) of a descent from values (n,) to the least effort at goals, and what was found there (4,)."""
+        end = values[None, None].copy()
+        found, _ = self.chain.descents(goals.tables[None], goals, self.nearest[None], self.asked, end, 1)
+        return end[0, 0], found[0, 0]
+
+
+class Along(Nearby):
+    """Branches of an arm of seven joints."""
+
+    __slots__ = ()
 
     def least(self, branches: Branches, most: float) -> Look | None:
         """The free posture of least effort, if that is less than `most`; the first one where no effort counts."""
@@ -71,9 +83,8 @@ class Along(NamedTuple):
 
     def _least_along(self, here: Array) -> tuple[Array, float]:
         """The posture (n,) where a branch has its least effort, blocked or not, and that effort."""
-        end = here[None, None].copy()
-        found, _ = self.chain.descents(self.goals.tables[None], self.goals, self.nearest[None], self.asked, end, 1)
-        return end[0, 0], float(found[0, 0, 1])
+        end, found = self.descended(self.goals, here)
+        return end, float(found[1])
 
     def _to_the_edge(self, free: Look, end: Array, last: float, most: float) -> Look:
         """From a free posture on towards an end (n,) of its branch, as far as all is free and less than `most` is left.

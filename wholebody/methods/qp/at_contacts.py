@@ -13,11 +13,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.geometry.proximity import Contacts
-from wholebody.methods.qp.along_branches import Look
+from wholebody.methods.qp.along_branches import Look, Nearby
 from wholebody.methods.qp.chain_goals_kernel import Goals
-from wholebody.methods.qp.plain_chain import PlainChain
 from wholebody.methods.qp.settings import SEEDS
-from wholebody.scene.workspace import Workspace
 
 MARGIN = 1e-6  # m: beyond clearances
 SAME = 1e-5  # rad, m: by which postures differ that count as one
@@ -30,17 +28,10 @@ class Planes(NamedTuple):
     joints: Indices  # (k, 2) of the point and of the plane
 
 
-class AtContacts(NamedTuple):
-    """What a problem asks of a chain."""
+class AtContacts(Nearby):
+    """Postures of a chain that touch things."""
 
-    chain: PlainChain
-    goals: Goals
-    at: Array  # (nq,) start
-    nearest: Array  # (2, n) see `chain_kernel.reach`
-    clearances: Array  # (pairs,) metres
-    within: float  # m: the largest of them
-    workspace: Workspace
-    asked: Array  # (5,) see `chain_kernel.reach`
+    __slots__ = ()
 
     def least(self, values: Array, most: float) -> tuple[Look, bool] | None:
         """From values (n,) that meet the goals the free ones of least effort nearby; None where they are not found.
@@ -68,9 +59,8 @@ class AtContacts(NamedTuple):
 
     def _descended(self, values: Array, planes: list[Planes]) -> tuple[Array, float]:
         """Values (n,) of least effort beyond planes, and that effort, inf where none are found."""
-        goals, end = self._beyond(planes), values[None, None].copy()
-        found, _ = self.chain.descents(goals.tables[None], goals, self.nearest[None], self.asked, end, 1)
-        return end[0, 0], float(found[0, 0, 1]) if found[0, 0, 2] > 0.0 else np.inf
+        end, found = self.descended(self._beyond(planes), values)
+        return end, float(found[1]) if found[2] > 0.0 else np.inf
 
     def _beyond(self, planes: list[Planes]) -> Goals:
         """The goals, with planes."""
