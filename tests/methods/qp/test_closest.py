@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -173,3 +175,43 @@ def test_what_goals_pull_into_things_is_no_proof_that_nothing_can_hold(honest):
     assert wb.solve(wb.Problem(scene)).solved
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (-0.3, 0.1, height)) for height in (1.4, 1.5)])
     assert honest(problem, wb.solve(problem)).status == "unreachable"
+
+
+IN_THE_WAY = [  # centres and half sides of boxes, and a target beyond them, all in the plane of an arm
+    ([((-0.325, -0.011), (0.217, 0.242)), ((0.333, -0.458), (0.15, 0.185))], (-1.147, -0.388)),
+    ([((-0.158, -0.367), (0.114, 0.175)), ((-0.542, -0.021), (0.175, 0.189))], (-1.243, -0.096)),
+    (
+        [((-0.564, -0.512), (0.147, 0.086)), ((0.488, -0.215), (0.07, 0.168)), ((-0.381, -0.694), (0.25, 0.071))],
+        (-0.783, -0.848),
+    ),
+]
+
+
+def apart(a, b, c, d):
+    """Least distances of segments a to b from c to d, each (n, 2), by samples of the first."""
+    share = np.linspace(0.0, 1.0, 15)[:, None, None]
+    along, on = d - c, a + (b - a) * share
+    t = np.clip(((on - c) * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12), 0.0, 1.0)[..., None]
+    return np.linalg.norm(on - c - along * t, axis=-1).min(axis=0)
+
+
+@pytest.mark.parametrize(("boxes", "target"), IN_THE_WAY)
+def test_beyond_things_an_arm_comes_as_near_as_any_of_a_hundred_thousand_postures(boxes, target, planar_arm):
+    """Descents from the start alone ended behind a box, up to 1.9 m farther from the target than others."""
+    lengths, radius = (0.4, 0.35, 0.25), 0.02
+    scene = wb.Scene(planar_arm(lengths, radius))
+    for k, (at, half) in enumerate(boxes):
+        scene.add(wb.Box((2 * half[0], 2 * half[1], 0.2)), name=f"box{k}", at=(*at, 0.0))
+    solution = wb.solve(wb.Problem(scene, goals=[wb.Point("tip", (*target, 0.0))]))
+    angles = np.cumsum(np.stack(np.meshgrid(*[np.linspace(-3.0, 3.0, 51)] * 3), axis=-1).reshape(-1, 3), axis=1)
+    joints = [np.zeros((len(angles), 2))]
+    for length, angle in zip(lengths, angles.T, strict=True):
+        joints.append(joints[-1] + length * np.column_stack([np.cos(angle), np.sin(angle)]))
+    free = apart(*joints[:2], *joints[2:]) > 2 * radius
+    for at, half in boxes:
+        for first, second in pairwise(joints):
+            on = first + (second - first) * np.linspace(0.0, 1.0, 15)[:, None, None]
+            free &= (np.linalg.norm(np.maximum(np.abs(on - at) - half, 0.0), axis=-1) > radius).all(axis=0)
+    least = np.linalg.norm(joints[-1][free] - target, axis=1).min()
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error <= least + 0.03

@@ -132,6 +132,7 @@ class ReachTrials(NamedTuple):
     out_of_reach: bool  # whether enough of them rest at the same distance
     nearest: LocalSolution | None  # of all ends that count and what was known the nearest; None without any
     spent: int  # programs
+    others: tuple[Array, ...] = ()  # where the others rest (nq,) that are as near
 
 
 def reach_trials(
@@ -154,7 +155,9 @@ def reach_trials(
         near = local if near is None or local.violation.total < near.violation.total else near
         most = SEARCH.agree * near.violation.total + tolerance
         if sum(end.violation.total <= most for end in ends) == agreeing:
-            return ReachTrials(True, near, spent)
+            return ReachTrials(
+                True, near, spent, tuple(end.q for end in ends if end is not near and end.violation.total <= most)
+            )
     return ReachTrials(False, near, spent)
 
 

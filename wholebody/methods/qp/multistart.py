@@ -15,7 +15,7 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.methods.contradictions import NEAREST, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
-from wholebody.methods.qp.iterates import LocalSolution, held, moving
+from wholebody.methods.qp.iterates import LocalSolution, held
 from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -31,7 +31,6 @@ from wholebody.methods.starts import (
     least_effort,
     restarts,
     seated,
-    throughout,
 )
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -46,7 +45,6 @@ class QPMultistart(Search):
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
     ) -> None:
         super().__init__(problem, workspace, solver, settings, control)
-        self._start = problem.scene.figure.clamp(problem.start)
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact: list[float] = []  # violations where descents from before contact ended
@@ -138,11 +136,9 @@ class QPMultistart(Search):
 
     def _from_elsewhere(self, count: int) -> Iterator[Attempt[LocalSolution]]:
         """Those from other starts, of which there are `count`."""
-        rng = np.random.default_rng(self.settings.seed)
-        if few := moving(self._shared, self.best.q) < SEARCH.few:
+        if few := self._few():
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
-        others = (throughout if few else restarts)(self.problem, self.lineariser.state, self._start, rng, count)
-        starts = self.lineariser.defined(others)
+        starts = self._seeded(count)
         aimed = self.problem.goals and not (few or self._least or self.out_of_reach)
         beside = self._beside(min(count, SEARCH.beside) if aimed else 0)
         for _ in range(count):  # in turn: one from beside takes the programs of two others
@@ -158,7 +154,7 @@ class QPMultistart(Search):
         found.search(found._attempts_for_feasibility())
         self.count(found)
         self.tried += found.tried
-        self.out_of_reach, self._near = found.out_of_reach, found._near
+        self.out_of_reach, self._near, self._resting = found.out_of_reach, found._near, found._resting
         if found.best is begin and begin.violation.worst > self.settings.tolerance:
             return None
         return self._descend(found.best.q) if self.accept(found.best, found.how) else found.best
@@ -344,9 +340,8 @@ class QPMultistart(Search):
             self._seek_held()
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
-        near, missed = self._near, self.best.violation
-        if near is not None and missed.worst > tolerance and SEARCH.agree * near.violation.total < missed.total:
-            self.accept(self._ran(self._closest(), self._probe(near.q, 0.0).q))
+        aside = self.out_of_reach or self._least  # else other starts were tried
+        self._pass_things(SEARCH.reach_trials_few if aside and self._few() else 0)
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
@@ -378,16 +373,14 @@ class QPMultistart(Search):
         """Whether the goals are out of reach of q (nq,): descents through everything all rest at the same distance."""
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
-        given = self.problem, self.lineariser.state, self._start, np.random.default_rng(self.settings.seed)
-        agreeing = SEARCH.agreeing_few if (few := moving(self._shared, self.best.q) < SEARCH.few) else SEARCH.agreeing
-        starts = throughout(*given, SEARCH.reach_trials_few - 1) if few else restarts(*given, SEARCH.reach_trials - 1)
-        starts = chain([q], self.lineariser.defined(starts))
+        agreeing = SEARCH.agreeing_few if (few := self._few()) else SEARCH.agreeing
+        starts = chain([q], self._seeded((SEARCH.reach_trials_few if few else SEARCH.reach_trials) - 1))
         enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
         found = reach_trials(reach, starts, self._near, agreeing, self.settings.tolerance)
         self.spent += found.spent
-        self._near = found.nearest
+        self._near, self._resting = found.nearest, found.others
         return found.out_of_reach
 
     def _closest_from_best(self) -> None:

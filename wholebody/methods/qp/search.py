@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import chain, zip_longest
 
 import numpy as np
 
@@ -10,12 +11,12 @@ from wholebody.base.arrays import Array, with_values
 from wholebody.methods.control import Control
 from wholebody.methods.qp.closest import Closest
 from wholebody.methods.qp.feasibility import Feasibility
-from wholebody.methods.qp.iterates import LocalSolution, Run, better, broken, held
+from wholebody.methods.qp.iterates import LocalSolution, Run, better, broken, held, moving
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Multistart
+from wholebody.methods.starts import Multistart, alike, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
@@ -39,7 +40,9 @@ class Search(Multistart[LocalSolution]):
         self.spent = 0  # iterations
         self.how = "directly"
         self._first: int | None = None  # programs of the first attempt, once it is made
+        self._start = problem.scene.figure.clamp(problem.start)
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
+        self._resting: tuple[Array, ...] = ()  # where other descents through things rest as near (nq,)
         self._missed = 0.0  # goals' residual with which a search ends, metres
 
     @property
@@ -115,6 +118,33 @@ class Search(Multistart[LocalSolution]):
 
     def _closest(self) -> Closest:
         return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)
+
+    def _few(self) -> bool:
+        """Whether few degrees of freedom move the goals."""
+        return moving(self._shared, self.best.q) < SEARCH.few
+
+    def _seeded(self, count: int) -> Iterator[Array]:
+        """So many postures at random, (nq,): throughout the limits where few degrees of freedom move the goals."""
+        rng = np.random.default_rng(self.settings.seed)
+        draw = throughout if self._few() else restarts
+        return self.lineariser.defined(draw(self.problem, self.lineariser.state, self._start, rng, count))
+
+    def _pass_things(self, count: int) -> None:
+        """Find the closest posture from where descents through things rest, and `count` others, until three end alike.
+
+        From each of them other ways lead past things.
+        """
+        if (near := self._near) is None:
+            return
+        ends = list[LocalSolution]()
+        for q in chain.from_iterable(zip_longest((near.q, *self._resting), self._seeded(count) if count else ())):
+            missed = self.best.violation
+            met = missed.worst <= self.settings.tolerance or missed.total <= SEARCH.agree * near.violation.total
+            if met or alike([end.violation.total for end in ends]):
+                return
+            if q is not None:
+                ends.append(self._ran(self._closest(), self._probe(q, 0.0).q))
+                self.accept(ends[-1])
 
     def _nearer(self, postures: Iterable[Array]) -> tuple[list[Array], float]:
         """Of postures (nq,) one about the nearest to goals and holds, and the share that it misses of the start's."""
