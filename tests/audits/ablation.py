@@ -168,6 +168,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods import starts
     from wholebody.methods.qp import closest, feasibility, multistart, sqp
     from wholebody.methods.qp import method as qp
+    from wholebody.methods.qp import search as descents
     from wholebody.methods.qp.feasibility import Feasibility
     from wholebody.methods.qp.solvers import base
     from wholebody.methods.qp.solvers.base import WorkingSet
@@ -207,7 +208,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         ),
         "end of probes that stall": (feasibility, "stalls", lambda history, tolerance: False),
         "rule of Boender and Rinnooy Kan": (starts, "all_found", lambda *given: False),
-        "Latin hypercube": (multistart, "throughout", multistart.restarts),
+        "Latin hypercube": (descents, "throughout", descents.restarts),
         "closest posture: curvature": (
             closest.Closest,
             "_curvature",
@@ -217,6 +218,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "relaxed probes": (search, "_relaxed", lambda self, start: None),
         "test of out of reach": (search, "_seems_out_of_reach", lambda self, q: False),
         "closest posture to goals that are not met": (search, "_find_closest", lambda self: None),
+        "closest posture past things": (search, "_pass_things", lambda self, count: None),
         "closest posture among things": (search, "_closest_from_best", lambda self: None),
     }
 
