@@ -201,11 +201,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
         "multipliers": (sqp, "DESCENT", with_values(sqp.DESCENT, near_met=0.0)),
         "working sets that grow": (base, "CORRECTIONS", with_values(base.CORRECTIONS, near=-1e9)),
-        "sets corrected in one entry": (
-            base,
-            "CORRECTIONS",
-            with_values(base.CORRECTIONS, at_once=10**6),
-        ),
         "end of probes that stall": (feasibility, "stalls", lambda history, tolerance: False),
         "rule of Boender and Rinnooy Kan": (starts, "all_found", lambda *given: False),
         "Latin hypercube": (descents, "throughout", descents.restarts),

@@ -46,6 +46,13 @@ def test_a_field_of_a_record_is_changed_in_every_module_that_reads_it() -> None:
     assert sqp.DESCENT is settings.DESCENT is before
 
 
+def test_every_mechanism_is_where_the_list_says() -> None:
+    given = ablation.mechanisms("qp")
+    missing = [name for name, (owner, attribute, _) in given.items() if not hasattr(owner, attribute)]
+    assert len(given) > 20
+    assert not missing
+
+
 def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ablation, "constants", lambda method: ([], []))
 
