@@ -193,7 +193,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
         "warm start from the last active set": (WorkingSet, "_corrected", cold),
         "seeds of arms": (qp, "from_seeds", lambda *given: None),
-        "before contact": (multistart, "before_contact", lambda *given: iter(())),
+        "before contact": (multistart, "before_contact", lambda *given, **options: iter(())),
         "feasibility first": (search, "feasibility_first", lambda self, start: self.directly(start)),
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
