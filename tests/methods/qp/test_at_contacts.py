@@ -108,7 +108,8 @@ def test_free_postures_are_led_to_less_effort():
     """Where what takes least effort is blocked, no descent from twenty other starts ends much lower than a solve."""
     case = problem_set("arms_among_things").make(148, 5501)
     problem, limits = case.problem, case.problem.scene.figure.limits
-    starts = np.random.default_rng(1).uniform(np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi), (20, 7))
+    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
+    starts = np.random.default_rng(1).uniform(lower, upper, (20, 7))
     ends = [end.assessment for end in wb.methods.QP().minima(problem, starts) if end.status == "solved"]
     assert len(ends) > 5
     assert wb.solve(problem).assessment.measure <= 1.01 * min(judged.measure for judged in ends)

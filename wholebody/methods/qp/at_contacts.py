@@ -39,28 +39,35 @@ class AtContacts(Nearby):
         The second is whether they are a minimum. None too where a descent leads to no less effort than `most`.
         No joint moves by more than `radius` [rad, m] before pairs are taken anew: a free posture stays in its place.
         """
-        planes, fresh, lost, moved = list[Planes](), True, False, np.inf
+        planes, fresh, moved, here = list[Planes](), True, np.inf, np.inf
+        least: Look | None = None
         for _ in range(SEEDS.closer):
             near = self.workspace.near(self.chain.posture(values, self.at), self.within + SEEDS.ahead)
             gaps = near.distance - self.clearances[near.number]
-            # Of what touches along a line or a face one point is the witness, then another: both stay.
-            planes = [*(planes[-2:] if moved < SEEDS.differing else ()), self._planes(near, gaps)]
-            end, effort = self._descended(values, planes, radius)
-            moved = float(np.abs(end - values).max())
-            if effort >= most and (moved < 0.9 * radius or lost):
-                if effort < np.inf or lost or radius == np.inf:
-                    return None
-                radius, lost = 0.3 * radius, True
-                continue
             free = float(gaps.min(initial=SEEDS.ahead))
+            if free >= 0.0 and here < most:
+                least, most = Look(values, here, free), here
+            # Of what touches along a line or a face one point is the witness, then another: both stay.
+            known = planes[-2:] if moved < SEEDS.differing or radius == np.inf else []
+            planes = [*known, self._planes(near, gaps)]
+            end, effort = self._descended(values, planes, radius)
+            if effort == np.inf and known:
+                planes = planes[-1:]
+                end, effort = self._descended(values, planes, radius)
+            moved = float(np.abs(end - values).max())
+            if effort == np.inf or (effort >= most and moved < 0.9 * radius and least is None):
+                break
             if moved < SAME and free >= 0.0:
                 end, _ = self._descended(values, planes[-1:], radius)
                 settled = float(np.abs(end - values).max()) < SAME
+                if effort > (1.0 + SAME) * most:
+                    break
                 if settled or not fresh:
                     return Look(values, effort, free), settled
                 planes, fresh = [], False  # those of before held it
-            values, radius = end, 1.5 * radius
-        return None
+            values, here = end, effort
+            radius = max(1.5 * moved, SEEDS.differing) if radius < np.inf else radius
+        return None if least is None else (least, False)
 
     def _descended(self, values: Array, planes: list[Planes], radius: float) -> tuple[Array, float]:
         """Values (n,) of least effort beyond planes, within a radius, and that effort, inf where none are found."""
