@@ -219,8 +219,9 @@ class Descents:
             return met
         contacts, at, tried = self._contacts(), self.asked.at, 0
         most, other = self._effort(met.q if met.free is None else met.free), self.blocked if met.free is None else at
-        for values in islice(self._free_ends(np.concatenate([*islice(batches, SEEDS.sparse)])), SEEDS.together):
-            if self.least > 0.0 and tried >= SEARCH.dear * np.log(most / self.least):
+        ends = (values for seeds in islice(batches, SEEDS.sparse) for values in self._free_ends(seeds))
+        while tried < (int(SEARCH.dear * np.log(most / self.least)) if self.least > 0.0 else SEEDS.together):
+            if (values := next(ends, None)) is None:
                 break
             tried += 1
             if (found := contacts.least(values, SEARCH.less * most, SEEDS.radius)) is not None:
