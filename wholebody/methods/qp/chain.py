@@ -125,7 +125,7 @@ class Descents:
         if guided:
             ends, found = first or self._first_ended()
             met, branches = self._chosen(ends, found), None
-            if self.rule.lacks(len(ends)):
+            if self.rule.lacks(len(ends)) or (finite and not len(ends)):  # a singular placement may have no branch
                 met = self._or_from_random(met)
             if met is None and not self.control.over:
                 branches = self._branches()
@@ -175,7 +175,7 @@ class Descents:
     def _or_from_random(self, met: Met | None) -> Met | None:
         """An end, or one of less effort from the first random seeds."""
         seeds = next(self.chain.seeds(self.start, self.settings.seed, self.rule.together))
-        other = self._ended(seeds, self.rule.enough)
+        other = self._ended(seeds, max(self.rule.enough, SEEDS.compared))
         if met is None or (other is not None and self._effort(other.q) < self._effort(met.q)):
             return other
         return with_values(met, trace=tuple(self.trace))
