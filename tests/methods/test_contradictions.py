@@ -11,6 +11,7 @@ import wholebody as wb
 from tests.needs import each
 from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.bench.suite.problem_sets.things import coal_distance, turned
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import contradictions
 from wholebody.tasks.range_of_motion import Coordinate, CoupledRow
@@ -144,6 +145,26 @@ def test_a_point_off_its_own_piece_may_be_inside(standing):
     goal = wb.Point("right_index_tip", (0.4, -0.3, 0.5), offset=(0.0, 0.0, -0.6))
     problem = standing((wb.Box((0.2, 0.2, 0.2)), (0.4, -0.3, 0.5)), goals=[goal])
     assert found(problem) == ()
+
+
+@pytest.mark.parametrize("off", [0.0, 0.03])
+def test_no_turn_of_its_piece_brings_a_point_nearer_than_its_bound(standing, off):
+    """A finger's end, or a place beyond it, in a box: what is nearer is too near to it however the finger turns."""
+    box, at, rng = wb.Box((0.2, 0.2, 0.2)), np.array([0.4, -0.3, 1.0]), np.random.default_rng(2)
+    goal = wb.Point("right_index_tip", at + [0.02, 0.03, 0.04], offset=(0.0, 0.0, -off))
+    problem = standing((box, at), goals=[goal], clearance=0.005)
+    (only,) = found(problem)
+    (asked,), (piece,) = problem.goals, box.pieces()
+    here = asked.place.placement.act(asked.resolved_offset)
+    own = [each for each in problem.scene.figure.geometry.geometryObjects if each.parentJoint == asked.place.joint]
+    assert own
+    for _ in range(300):
+        turn, way = pin.Quaternion(*turned(rng)).matrix(), rng.normal(size=3)
+        way *= 0.999 * only.least / np.linalg.norm(way)
+        joint = pin.SE3(turn, asked.resolved_target + way - turn @ here)
+        there = pin.SE3(np.eye(3), at)
+        gaps = [coal_distance(each.geometry, joint * each.placement, piece.geometry, there) for each in own]
+        assert min(gaps) < 0.005
 
 
 def test_a_tip_may_be_asked_onto_a_face(standing):

@@ -219,24 +219,29 @@ class _Finder:
                 joint = parent
 
     def goals_inside(self) -> None:
-        """Find goals for points inside of things that the points' own piece must not penetrate."""
+        """Find goals for points that are deeper in things than the pieces of the points' own joint can be."""
+        # A point at a depth in its piece, negative outside, is the centre of a ball in it, or at that distance from a
+        # place of it, however the piece turns: its depth in a thing is at most minus this, less the clearance.
         table, geometry = self._workspace.table, self._workspace.geometry
         for number, name, found, here, wanted in self._wanted():
-            own = [k for k in np.flatnonzero(table.joint == found.joint).tolist() if self._depth(k, here) > -ON_SURFACE]
-            pairs = np.isin(table.pairs, own).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
-            deepest, thing = 0.0, -1
-            for pair in np.flatnonzero(pairs).tolist() if found.joint else ():
+            own = {k: self._depth(k, here) for k in np.flatnonzero(table.joint == found.joint).tolist() if found.joint}
+            pairs = np.isin(table.pairs, [*own]).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
+            depths, deepest, thing = dict[int, float](), 0.0, -1
+            for pair in np.flatnonzero(pairs).tolist():
                 a, b = table.pairs[pair].tolist()
-                other = b if table.joint[b] == 0 else a
+                mine, other = (a, b) if table.joint[b] == 0 else (b, a)
+                asked = own[mine] + float(self._problem.clearances[pair])
                 centre = geometry.geometryObjects[other].placement.translation
-                if np.linalg.norm(wanted - centre) < table.reach[other]:
-                    depth = self._depth(other, wanted)
-                    if depth > CLEAR and depth + self._problem.clearances[pair] > deepest:
-                        deepest, thing = depth + float(self._problem.clearances[pair]), other
+                if np.linalg.norm(wanted - centre) < table.reach[other] + asked:
+                    depths[other] = depths[other] if other in depths else self._depth(other, wanted)
+                    if depths[other] + asked > max(deepest, CLEAR):
+                        deepest, thing = depths[other] + asked, other
             if thing >= 0 and (number not in self.missed or deepest > self.missed[number].least):
-                text = f"{name}, is in {self._workspace.owners[thing]}, {1e3 * deepest:.3g} mm from where it can be"
+                where = "in" if depths[thing] > 0.0 else "beside"
+                far = f"{1e3 * deepest:.3g} mm from where it can be"
+                text = f"{name}, is {where} {self._workspace.owners[thing]}, at least {far}"
                 self.missed[number] = Contradiction("unreachable", text, deepest)
-            elif thing < 0 and number not in self.missed and isinstance(goal := self._problem.goals[number], Frame):
+            if isinstance(goal := self._problem.goals[number], Frame):
                 self._placed_inside(number, name, goal, found)
 
     def _placed_inside(self, number: int, name: str, goal: Frame, found: Place) -> None:

@@ -8,6 +8,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets import robots
+from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.methods.control import Control
 from wholebody.methods.qp import chain_goals_kernel
 from wholebody.methods.qp.at_contacts import MARGIN, AtContacts
@@ -101,3 +102,14 @@ def test_what_is_led_to_no_contact_stays_known(monkeypatch, fails):
                 if fails and not np.array_equal(met.q, at):
                     assert met.complete == (far[0] >= 0.9 * far[1])
     assert count > 2
+
+
+def test_free_postures_are_led_to_less_effort():
+    """Where what takes least effort is blocked, no descent from twenty other starts ends much lower than a solve."""
+    case = problem_set("arms_among_things").make(148, 5501)
+    problem, limits = case.problem, case.problem.scene.figure.limits
+    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
+    starts = np.random.default_rng(1).uniform(lower, upper, (20, 7))
+    ends = [end.assessment for end in wb.methods.QP().minima(problem, starts) if end.status == "solved"]
+    assert len(ends) > 5
+    assert wb.solve(problem).assessment.measure <= 1.01 * min(judged.measure for judged in ends)

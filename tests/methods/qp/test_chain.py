@@ -583,3 +583,13 @@ def test_a_joint_may_have_to_turn_by_more_than_half_a_turn():
     assert wb.assess(problem, witness).holds(0.0)
     assert wb.solve(problem).solved
     assert wb.solve_many([problem])[0].message == "solved directly"
+
+
+def test_a_singular_placement_without_a_branch_is_met_with_the_least_effort():
+    """Where axes of a straight wrist are parallel, the closed form has no posture: no descent ends lower."""
+    figure, start = robots.known_arm("ur5")
+    there = figure.placement(np.array([1.75, -0.53, -0.1, -1.77, 0.0, -1.04]), "tool")
+    problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Frame("tool", there)])
+    ends = wb.methods.QP().minima(problem, np.random.default_rng(0).uniform(-2.5, 2.5, (10, 6)))
+    least = min(end.assessment.measure for end in ends if end.status == "solved")
+    assert wb.solve(problem).assessment.measure <= 1.001 * least

@@ -38,10 +38,14 @@ class Nearby(NamedTuple):
     workspace: Workspace
     asked: Array  # (5,) see `chain_kernel.reach`
 
-    def descended(self, goals: Goals, values: Array) -> tuple[Array, Array]:
-        """The end (n,) of a descent from values (n,) to the least effort at goals, and what was found there (4,)."""
+    def descended(self, goals: Goals, values: Array, radius: float = np.inf) -> tuple[Array, Array]:
+        """The end (n,) of a descent from values (n,) to the least effort at goals, and what was found there (4,).
+
+        No joint moves by more than a radius.
+        """
         end = values[None, None].copy()
-        found, _ = self.chain.descents(goals.tables[None], goals, self.nearest[None], self.asked, end, 1)
+        chain = self.chain if radius == np.inf else self.chain.within(values - radius, values + radius)
+        found, _ = chain.descents(goals.tables[None], goals, self.nearest[None], self.asked, end, 1)
         return end[0, 0], found[0, 0]
 
 

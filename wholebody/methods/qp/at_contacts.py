@@ -33,33 +33,45 @@ class AtContacts(Nearby):
 
     __slots__ = ()
 
-    def least(self, values: Array, most: float) -> tuple[Look, bool] | None:
+    def least(self, values: Array, most: float, radius: float = np.inf) -> tuple[Look, bool] | None:
         """From values (n,) that meet the goals the free ones of least effort nearby; None where they are not found.
 
         The second is whether they are a minimum. None too where a descent leads to no less effort than `most`.
+        No joint moves by more than `radius` [rad, m] before pairs are taken anew: a free posture stays in its place.
         """
-        planes, fresh = list[Planes](), True
+        planes, fresh, moved, here = list[Planes](), True, np.inf, np.inf
+        least: Look | None = None
         for _ in range(SEEDS.closer):
             near = self.workspace.near(self.chain.posture(values, self.at), self.within + SEEDS.ahead)
             gaps = near.distance - self.clearances[near.number]
-            # Of what touches along a line or a face one point is the witness, then another: both stay.
-            planes = [*planes[-2:], self._planes(near, gaps)]
-            end, effort = self._descended(values, planes)
-            if effort >= most:
-                return None
             free = float(gaps.min(initial=SEEDS.ahead))
-            if float(np.abs(end - values).max()) < SAME and free >= 0.0:
-                end, _ = self._descended(values, planes[-1:])
+            if free >= 0.0 and here < most:
+                least, most = Look(values, here, free), here
+            # Of what touches along a line or a face one point is the witness, then another: both stay.
+            known = planes[-2:] if moved < SEEDS.differing or radius == np.inf else []
+            planes = [*known, self._planes(near, gaps)]
+            end, effort = self._descended(values, planes, radius)
+            if effort == np.inf and known:
+                planes = planes[-1:]
+                end, effort = self._descended(values, planes, radius)
+            moved = float(np.abs(end - values).max())
+            if effort == np.inf or (effort >= most and moved < 0.9 * radius and least is None):
+                break
+            if moved < SAME and free >= 0.0:
+                end, _ = self._descended(values, planes[-1:], radius)
                 settled = float(np.abs(end - values).max()) < SAME
+                if effort > (1.0 + SAME) * most:
+                    break
                 if settled or not fresh:
                     return Look(values, effort, free), settled
                 planes, fresh = [], False  # those of before held it
-            values = end
-        return None
+            values, here = end, effort
+            radius = max(1.5 * moved, SEEDS.differing) if radius < np.inf else radius
+        return None if least is None else (least, False)
 
-    def _descended(self, values: Array, planes: list[Planes]) -> tuple[Array, float]:
-        """Values (n,) of least effort beyond planes, and that effort, inf where none are found."""
-        end, found = self.descended(self._beyond(planes), values)
+    def _descended(self, values: Array, planes: list[Planes], radius: float) -> tuple[Array, float]:
+        """Values (n,) of least effort beyond planes, within a radius, and that effort, inf where none are found."""
+        end, found = self.descended(self._beyond(planes), values, radius)
         return end, float(found[1]) if found[2] > 0.0 else np.inf
 
     def _beyond(self, planes: list[Planes]) -> Goals:
@@ -77,18 +89,15 @@ class AtContacts(Nearby):
         """Planes of the nearest pairs."""
         chain, joints = self.chain, self.workspace.state.joints
         carriers = chain.carriers[self.workspace.table.joint[near.pair]]  # (k, 2)
-        first, last = carriers.T
-        some = np.flatnonzero(first != last)
-        some = some[np.argsort(gaps[some], kind="stable")[:16]]
-        swap = last[some] == 0  # the plane is of what stands around
-        sign = np.where(swap, -1.0, 1.0)[:, None]
-        base, point = np.where(swap, last[some], first[some]), np.where(swap, first[some], last[some])
-        on, off = near.point_a[some], near.point_b[some]
-        on, off = np.where(swap[:, None], off, on), np.where(swap[:, None], on, off)
-        normal = sign * near.normal[some]
+        some = (carriers[:, 0] != carriers[:, 1]).nonzero()[0]
+        some = some[gaps[some].argsort(kind="stable")[:16]]
+        two, swap = carriers[some], (carriers[some, 1] == 0).astype(np.intp)  # the plane is of what stands around
+        ends, normal = np.stack((near.point_a, near.point_b)), (1 - 2 * swap)[:, None] * near.normal[some]
+        rows, point = np.arange(len(some)), 1 - swap
+        on, off, base, point = ends[swap, some], ends[point, some], two[rows, swap], two[rows, point]
         based, placed = joints[chain.joints[base]], joints[chain.joints[point]]  # (k, 4, 3)
         floats = np.empty((len(some), 7))
-        floats[:, :3] = np.einsum("kij,kj->ki", placed[:, :3], off - placed[:, 3])
-        floats[:, 3:6] = np.einsum("kij,kj->ki", based[:, :3], normal)
+        floats[:, :3] = (placed[:, :3] @ (off - placed[:, 3])[:, :, None])[:, :, 0]
+        floats[:, 3:6] = (based[:, :3] @ normal[:, :, None])[:, :, 0]
         floats[:, 6] = ((on - based[:, 3]) * normal).sum(axis=1) + self.clearances[near.number[some]] + MARGIN
-        return Planes(floats, np.column_stack([point, base]))
+        return Planes(floats, np.stack((point, base), axis=1))

@@ -5,6 +5,8 @@ Seeds are the branches of the closed form of an arm that has one, else the start
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +18,7 @@ from wholebody.methods.qp.at_contacts import AtContacts
 from wholebody.methods.qp.chain_problem import Asked, Rule, chains_of, distance_of, goal_entries, how_far, is_free
 from wholebody.methods.qp.closed_form import Branches
 from wholebody.methods.qp.plain_chain import FIRST, NEARBY, PlainChain, rows_of
-from wholebody.methods.qp.settings import SEEDS, Settings
+from wholebody.methods.qp.settings import SEARCH, SEEDS, Settings
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -35,6 +37,7 @@ class Met(NamedTuple):
     free: Array | None = None  # (nq,) a posture that does, where q is the start instead, as all ends were blocked
     through: Array | None = None  # (nq,) the end of least effort that does not keep its clearances, where known
     near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
+    led: bool = False  # whether free postures were led to contacts in search of less effort
 
     @property
     def begins(self) -> tuple[Array, ...]:
@@ -122,7 +125,7 @@ class Descents:
         if guided:
             ends, found = first or self._first_ended()
             met, branches = self._chosen(ends, found), None
-            if self.rule.lacks(len(ends)):
+            if self.rule.lacks(len(ends)) or (finite and not len(ends)):  # a singular placement may have no branch
                 met = self._or_from_random(met)
             if met is None and not self.control.over:
                 branches = self._branches()
@@ -145,8 +148,8 @@ class Descents:
                 settled = self.chain.arm is not None and not self.asked.bounded and not self.asked.goals.one_sided.any()
                 return with_values(met, blocked=None, stationary=self.measured) if settled else met
             first = None
-        best = None
-        for number, seeds in enumerate(self.chain.seeds(self.start, self.settings.seed, self.rule.together), 1):
+        best, batches = None, self.chain.seeds(self.start, self.settings.seed, self.rule.together)
+        for number, seeds in enumerate(batches, 1):
             if self.measured < self.rule.measured:
                 met = self._from_free(seeds)
             elif first is None:
@@ -163,7 +166,7 @@ class Descents:
             # Where few seeds lead to the goals, the next ones may lead to less effort.
             few = self.measured and self.met < SEEDS.compared and number < SEEDS.sparse
             if (best is not None and not few) or self.control.over:
-                return best
+                return self._lower(best, batches)
             redundant = self.measured and len(self.start) > self.rule.rows
             if number == SEEDS.weighed and redundant and self.blocked is not None:
                 self.measured = False  # ends of least effort gather at the same places: of others more are free
@@ -172,7 +175,7 @@ class Descents:
     def _or_from_random(self, met: Met | None) -> Met | None:
         """An end, or one of less effort from the first random seeds."""
         seeds = next(self.chain.seeds(self.start, self.settings.seed, self.rule.together))
-        other = self._ended(seeds, self.rule.enough)
+        other = self._ended(seeds, max(self.rule.enough, SEEDS.compared))
         if met is None or (other is not None and self._effort(other.q) < self._effort(met.q)):
             return other
         return with_values(met, trace=tuple(self.trace))
@@ -209,6 +212,34 @@ class Descents:
             return None
         blocked = self.blocked if self.left < SEEDS.worth * most else None
         return with_values(best, blocked=blocked, through=self.blocked)
+
+    def _lower(self, met: Met | None, batches: Iterator[Array]) -> Met | None:
+        """An end, or one of less effort where free postures of more batches are led to contacts."""
+        if met is None or met.complete or met.through is None or self.asked.bounded or self.asked.own:
+            return met
+        contacts, at, tried = self._contacts(), self.asked.at, 0
+        most, other = self._effort(met.q if met.free is None else met.free), self.blocked if met.free is None else at
+        ends = (values for seeds in islice(batches, SEEDS.sparse) for values in self._free_ends(seeds))
+        while tried < (int(SEARCH.dear * np.log(most / self.least)) if self.least > 0.0 else SEEDS.together):
+            if (values := next(ends, None)) is None:
+                break
+            tried += 1
+            if (found := contacts.least(values, SEARCH.less * most, SEEDS.radius)) is not None:
+                most = found[0].effort
+                blocked = other if self.least < SEEDS.worth * most else None
+                q = self.chain.posture(found[0].values, at)
+                met = Met(q, met.trace, found[1], blocked, through=self.blocked)
+        return with_values(met, led=tried > 0)
+
+    def _free_ends(self, seeds: Array) -> Iterator[Array]:
+        """Values (n,) of free ends of descents without measure from seeds, those of least effort first."""
+        goals, at, nearest, *_ = self.asked
+        known, asked = (nearest * [[1.0], [0.0]])[None], how_far(self.settings, len(seeds), others=True)
+        found, _ = self.chain.descents(goals.tables[None], goals, known, asked, seeds[None], len(seeds))
+        effort = np.where(found[0, :, 1] < np.inf, (seeds - nearest[0]) ** 2 @ nearest[1], np.inf)
+        for k in effort.argsort()[: np.count_nonzero(effort < np.inf)]:
+            if self._is_free(self.chain.posture(seeds[k], at)):
+                yield seeds[k]
 
     def _contacts(self) -> AtContacts:
         goals, at, nearest, clearances, *_ = self.asked

@@ -94,10 +94,15 @@ class PlainChain:
         held = np.isin(self.idx_v, frozen)
         if not held.any():
             return self
-        made, values, own = copy(self), self.angles(q), self.chain
-        lower, upper = (np.where(held, values, limit) for limit in (own.lower, own.upper))
-        made.chain, made.arm, made.guide = with_values(own, lower=lower, upper=upper), None, None
-        made.held, made.samples, made.first = -1, (1, 1), 0
+        values = self.angles(q)
+        made = self.within(np.where(held, values, -np.inf), np.where(held, values, np.inf))
+        made.arm, made.guide, made.held, made.samples, made.first = None, None, -1, (1, 1), 0
+        return made
+
+    def within(self, lower: Array, upper: Array) -> PlainChain:
+        """The chain whose joints keep these limits (n,) too."""
+        made, own = copy(self), self.chain
+        made.chain = with_values(own, lower=np.maximum(own.lower, lower), upper=np.minimum(own.upper, upper))
         return made
 
     def angles(self, q: Array) -> Array:

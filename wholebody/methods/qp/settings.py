@@ -107,7 +107,8 @@ class SeedNumbers(NamedTuple):
     gain: float = 1e-4  # share of the effort that another look at an edge is worth. Less: less effort, more looks.
     closer: int = 16  # most looks at postures on the way to one edge
     near: int = 3  # ends near goals that no posture meets from which the nearest is sought. More: nearer, more time.
-    differing: float = 0.1  # rad or m by which these differ
+    differing: float = 0.1  # rad or m by which these differ, and beyond which contacts are others
+    radius: float = 0.5  # rad, m: of a step from a free posture. More: fewer steps, limbs jump into what is behind.
     deep: float = 5e-3  # m: of a posture inside of a thing that no tolerance of the goals leads out of
 
 
