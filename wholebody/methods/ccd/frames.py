@@ -16,7 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
-from wholebody.methods.ccd.chain import MARGIN, Tracked
+from wholebody.methods.ccd.chain import Tracked
 from wholebody.methods.ccd.resolver import PERTURBATIONS, Counts, OverlapResolver
 from wholebody.scene.scene import Scene
 
@@ -158,7 +158,7 @@ class FrameResolver:
         self._workspace.begin()
         self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
         resolver = self._resolver
-        resolver.counts, resolver.margin = Counts(), MARGIN
+        resolver.counts = Counts()
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
         for data, q in zip(self._data, (wanted, q_free), strict=True):
             pin.forwardKinematics(self._model, data, q)
@@ -192,9 +192,7 @@ class FrameResolver:
         """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
         resolver, attraction = self._resolver, self._attraction
         before = resolver.placed
-        free = not resolver.query(wanted)
-        resolver.margin = 5e-3 if free else MARGIN  # m: limbs that return to a free posture need room to turn
-        if free and not self._passes_through(before, q, wanted):
+        if not resolver.query(wanted) and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
             if shown is not None:
                 return shown
