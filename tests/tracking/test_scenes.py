@@ -106,7 +106,7 @@ def test_judging_finds_what_is_planted(hand: wb.Figure, scene: wb.Scene) -> None
 
 
 def test_by_ccd_root_and_trunk_follow_into_a_wall() -> None:
-    """They stay no farther behind than the tracked posture is deep, though every limb could be at its tracked angles."""
+    """They stay no farther behind than the tracked posture is deep, though every limb could be at its angles."""
     built = build_scene("two_arms_and_leg", frames=150)
     recording = follow(built.scene, built.track, overlap="ccd")
     tracked, shown = recording.tracked[-1], recording.q[-1]
