@@ -147,7 +147,7 @@ class FrameResolver:
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
         self._resolver = OverlapResolver(scene, self._workspace)
         self._data = scene.model.createData(), scene.model.createData()  # at the tracked posture, and as shown before
-        self._tracked = Tracked(*(data.oMi for data in self._data))
+        self._resolver.tracked = Tracked(*(data.oMi for data in self._data))
         self._attraction = Attraction(scene, self._resolver)
         self._parts = self._attraction.parts
 
@@ -164,7 +164,6 @@ class FrameResolver:
             pin.forwardKinematics(self._model, data, q)
         for chain in resolver.chains.values():
             chain.translated.clear()
-        resolver.tracked = self._tracked
         self._swept = False
         q, free = self._freed(q_free, rng)
         if not free:
@@ -178,10 +177,6 @@ class FrameResolver:
         """A posture near q (nq,) out of what things were moved into it, and whether it is free."""
         resolver = self._resolver
         found, overlaps = resolver.resolve(q, rng, OVERRUN)
-        if overlaps:  # a link that is turned back to its tracked direction may be turned into the thing
-            resolver.tracked = None
-            found, overlaps = resolver.resolve(q, rng, resolver.counts.work + OVERRUN)
-            resolver.tracked = self._tracked
         for size in PERTURBATIONS if overlaps else ():
             perturbed, still = resolver.resolve(self._perturbed(q, size, rng), rng, resolver.counts.work + OVERRUN)
             if not still:
