@@ -113,3 +113,12 @@ def test_by_ccd_root_and_trunk_follow_into_a_wall() -> None:
     deep = -built.scene.contacts(tracked, within=0.0).distance.min()
     assert 0.1 < deep < 0.2  # m
     assert np.linalg.norm(shown[:3] - tracked[:3]) < deep
+
+
+def test_by_ccd_what_rests_against_a_thing_stays_still() -> None:
+    """The tracked posture goes into a wall and stays there: 30 frames later nothing of the shown one moves."""
+    built = build_scene("two_arms_and_leg", frames=150)
+    postures = built.track.q[[*range(105), *[105] * 50]]
+    shown = follow(built.scene, wb.Clip(built.scene.figure, postures, built.track.dt), overlap="ccd").q[-20:]
+    assert np.abs(pin.difference(built.scene.model, shown[0], postures[-1])).max() > 0.1  # rad: kept out
+    assert np.abs(shown - shown[0]).max() < 1e-9
