@@ -103,3 +103,22 @@ def test_judging_finds_what_is_planted(hand: wb.Figure, scene: wb.Scene) -> None
     assert judged.root_distance[1] == pytest.approx(0.025)
     assert judged.distance[0] == 0.0
     assert judged.returns == ((2, 0),)
+
+
+def test_by_ccd_root_and_trunk_follow_into_a_wall() -> None:
+    """They stay no farther behind than the tracked posture is deep, though every limb could be at its angles."""
+    built = build_scene("two_arms_and_leg", frames=150)
+    recording = follow(built.scene, built.track, overlap="ccd")
+    tracked, shown = recording.tracked[-1], recording.q[-1]
+    deep = -built.scene.contacts(tracked, within=0.0).distance.min()
+    assert 0.1 < deep < 0.2  # m
+    assert np.linalg.norm(shown[:3] - tracked[:3]) < deep
+
+
+def test_by_ccd_what_rests_against_a_thing_stays_still() -> None:
+    """The tracked posture goes into a wall and stays there: 30 frames later nothing of the shown one moves."""
+    built = build_scene("two_arms_and_leg", frames=150)
+    postures = built.track.q[[*range(105), *[105] * 50]]
+    shown = follow(built.scene, wb.Clip(built.scene.figure, postures, built.track.dt), overlap="ccd").q[-20:]
+    assert np.abs(pin.difference(built.scene.model, shown[0], postures[-1])).max() > 0.1  # rad: kept out
+    assert np.abs(shown - shown[0]).max() < 1e-9

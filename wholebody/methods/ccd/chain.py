@@ -193,13 +193,13 @@ class ChainResolver:
         for guard in self._guards:
             guard.keep()
 
-    def push(self, link: Link, margin: float = MARGIN, tracked: Tracked | None = None) -> tuple[int, ...]:
-        """Move the link out of the obstacle by `margin` metres; the nodes that moved. Call `read` first."""
+    def push(self, link: Link, tracked: Tracked | None = None) -> tuple[int, ...]:
+        """Move the link out of the obstacle; the nodes that moved. Call `read` first."""
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
         if length < 1e-9:
             return ()
-        grow = 1.0 + margin / length
+        grow = 1.0 + MARGIN / length
         push = (grow * x, grow * y, grow * z)
         inner = self._inner(link)
         there = self._kept(link, push, tracked) if inner else None

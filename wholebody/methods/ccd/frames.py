@@ -16,7 +16,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
-from wholebody.methods.ccd.chain import MARGIN, Tracked
+from wholebody.methods.ccd.chain import Tracked
 from wholebody.methods.ccd.resolver import PERTURBATIONS, Counts, OverlapResolver
 from wholebody.scene.scene import Scene
 
@@ -147,7 +147,7 @@ class FrameResolver:
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
         self._resolver = OverlapResolver(scene, self._workspace)
         self._data = scene.model.createData(), scene.model.createData()  # at the tracked posture, and as shown before
-        self._tracked = Tracked(*(data.oMi for data in self._data))
+        self._resolver.tracked = Tracked(*(data.oMi for data in self._data))
         self._attraction = Attraction(scene, self._resolver)
         self._parts = self._attraction.parts
 
@@ -158,13 +158,12 @@ class FrameResolver:
         self._workspace.begin()
         self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
         resolver = self._resolver
-        resolver.counts, resolver.margin = Counts(), MARGIN
+        resolver.counts = Counts()
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
         for data, q in zip(self._data, (wanted, q_free), strict=True):
             pin.forwardKinematics(self._model, data, q)
         for chain in resolver.chains.values():
             chain.translated.clear()
-        resolver.tracked = self._tracked
         self._swept = False
         q, free = self._freed(q_free, rng)
         if not free:
@@ -178,10 +177,6 @@ class FrameResolver:
         """A posture near q (nq,) out of what things were moved into it, and whether it is free."""
         resolver = self._resolver
         found, overlaps = resolver.resolve(q, rng, OVERRUN)
-        if overlaps:  # a link that is turned back to its tracked direction may be turned into the thing
-            resolver.tracked = None
-            found, overlaps = resolver.resolve(q, rng, resolver.counts.work + OVERRUN)
-            resolver.tracked = self._tracked
         for size in PERTURBATIONS if overlaps else ():
             perturbed, still = resolver.resolve(self._perturbed(q, size, rng), rng, resolver.counts.work + OVERRUN)
             if not still:
@@ -192,9 +187,7 @@ class FrameResolver:
         """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
         resolver, attraction = self._resolver, self._attraction
         before = resolver.placed
-        free = not resolver.query(wanted)
-        resolver.margin = 5e-3 if free else MARGIN  # m: limbs that return to a free posture need room to turn
-        if free and not self._passes_through(before, q, wanted):
+        if not resolver.query(wanted) and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
             if shown is not None:
                 return shown

@@ -13,7 +13,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.methods.ccd.chain import MARGIN, ChainResolver, Overlap, Tracked
+from wholebody.methods.ccd.chain import ChainResolver, Overlap, Tracked
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.control import Control
@@ -48,13 +48,11 @@ class OverlapResolver:
         placed: the pieces and pairs at the last query.
         counts: the work since it was last set.
         deepest: largest shortfall of a pair from its clearance in the last query, metres.
-        margin: distance by which links end outside, metres.
         tracked: joint placements whose orientation links that are translated take; None for that which they have.
     """
 
     def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED) -> None:
         """Prepare for clearances of zero; `begin` takes others."""
-        self.margin = MARGIN
         self.tracked: Tracked | None = None
         self.scene, self.workspace, self._kept = scene, workspace, kept
         self.begin(None, TOLERANCE, Control(np.inf))
@@ -140,7 +138,7 @@ class OverlapResolver:
             worst, node = link.depth, link.node
             began = time.perf_counter()
             chain.read(q, self._data)
-            nodes = chain.push(link, self.margin, self.tracked)
+            nodes = chain.push(link, self.tracked)
             chain.limbs.write(q)
             self.counts.ik_seconds += time.perf_counter() - began
             self.counts.iterations += 1
