@@ -49,11 +49,11 @@ def descend(
     tolerance: float,
     most: float,
 ) -> bool:
-    """Sweep until goals are met, nothing moves, or `most` sweeps are made; true if a part of the tables is left before.
+    """Sweep until goals are met, nothing moves, or `most` sweeps are made; true if a part is left before.
 
-    `limbs` are arrays of `Limbs`; `pursuit`: aims and their nodes, targets and theirs, factors (halves, m) in each half of
-    a sweep. `inside` (n,) has the last values that left nothing. `state` (3,): sweeps, halves of the next one that are
-    made, its largest change. After a true answer bring what is left back, carry the aims, and call it again.
+    `limbs` are arrays of `Limbs`; `pursuit`: aims and their nodes, targets and theirs, factors (halves, m) in each half
+    of a sweep. `inside` (n,) has the last values that left nothing. `state` (3,): sweeps, halves of the next one that
+    are made, its largest change. After a true answer bring what is left back, carry the aims, and call it again.
     """
     parents, places, slides, axes, values, limits, frames, lines = limbs
     aims, nodes, targets, bases, halves = pursuit

@@ -303,7 +303,7 @@ class Guards:
                 self.inside[rows] = self._limbs.values[rows]
 
     def keep(self) -> None:
-        """Bring the nodes back inside, after `limbs.forward`, and call it; where that fails, to the last ones inside."""
+        """Bring the nodes back inside, or to where they last were, after `limbs.forward`, and call it."""
         if not self.kept():
             for group, rows in zip(self._groups, self._rows, strict=True):
                 self._keep(group, rows)

@@ -91,7 +91,7 @@ class Reach:
             if error > 0.97 * last:
                 converged = True
                 break
-            last, until = error, min(state[0] + 25.0, most)  # near a goal convergence is linear, and sometimes slow
+            last, until = error, min(float(state[0]) + 25.0, float(most))  # near a goal convergence is linear, and sometimes slow
             while descend(*arrays, state, tolerance, until):
                 self._guards.keep()
                 pursuit.carry()
