@@ -84,7 +84,7 @@ class Reach:
         self._guards.keep()
         pursuit = _Pursuit(limbs, self._data, self._goals)
         plan, descend = pursuit.aims.plan(), compiled_kernel().descend
-        arrays = limbs.arrays, pursuit.arrays, plan, tuple(self._guards.tables), self._guards.inside
+        arrays = limbs.arrays, pursuit.arrays, tuple(plan), tuple(self._guards.tables), self._guards.inside
         error, last, state = pursuit.aims.error, inf, np.zeros(3)  # sweeps, halves of one, largest change
         converged = not len(plan.turns)
         while error > tolerance and state[0] < most and not converged and not self._control.over:
