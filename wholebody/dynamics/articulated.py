@@ -24,7 +24,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross, with_values
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.blows import BOUNCE, left_for_later
+from wholebody.dynamics.blows import BOUNCE, left_for_later, undo
 from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques
 from wholebody.dynamics.frame import EngineFrame, Given, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
@@ -178,6 +178,7 @@ class Articulated:
         """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
         began, start, stood = self.energy(), self.velocity, self._touching.joints(self.q)
+        had = began + (0.0 if engine is None else engine.energy())
         points = self._touching.points(self.q, start, planned, moved)
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
@@ -205,6 +206,7 @@ class Articulated:
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # what parts an overlap has its energy from nowhere
         work -= np.maximum(0.0, (bearing * parting.reshape(-1, 3)).sum(axis=1))
+        had += float(motor @ moves)
         paid = float(motor @ moves + work[points.driven].sum())
         rise = self._move(moves, drifted, np.inf if self.stiffness.any() else began + paid)
         if self._driven:
@@ -218,11 +220,15 @@ class Articulated:
         if self._sunk(points, ended, time, {name: way[1] for name, way in motions.items()}) and again:
             return time, None, True
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
-        self._settle(began + paid, most, [momentum for momentum, _ in drifted])
+        things = 0.0 if engine is None else engine.energy()
+        if self._settle(began + paid, most, [momentum for momentum, _ in drifted], had - things) and again:
+            return time, None, True
         if engine is None:
             return time, None, False
         held, places = points.held(bearing), self._carried(segments, stood, stands)
         before = engine.energy(), self.energy()
+        fall = np.concatenate([time * self._gravity, np.zeros(3)])
+        unpushed = {name: engine.twist(name) + fall for name in engine.bodies}
         frame = engine.advance(time, places.and_others(motions), held, segments, BOUNCE if again else np.inf)
         given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
         if not again and left_for_later(engine, frame, given, before, lambda some: self._reacted(some, segments)[1]):
@@ -230,7 +236,8 @@ class Articulated:
         else:
             ways = {name: places.way(name) for name in given}
             paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
-        self._react(given, paid, segments)
+        if self._react(given, paid, segments, had - engine.energy()):
+            undo(engine, frame, unpushed, before[0])
         return time, frame, False
 
     def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
@@ -362,8 +369,12 @@ class Articulated:
         placed[:, :, 3, 3] = 1.0
         return Given(list(segments), placed @ seats[:, None])
 
-    def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
-        """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`."""
+    def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force], left: float) -> bool:
+        """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`.
+
+        Momenta alone may take what is `left` of the energy of all that moves by itself, of which blows lose some. True
+        where that is not enough for them.
+        """
         masses, roots, velocity = self._inertia(self.q), self._adrift, self.velocity
         pin.forwardKinematics(self._model, self._data, self.q)
         drift = np.zeros_like(velocity)
@@ -375,21 +386,28 @@ class Articulated:
             velocity[roots] = 0.0
             velocity[roots] = -impulse_kernel.by_inertia(locked, masses[roots] @ velocity)
         kinetic = [0.5 * float(part @ masses @ part) for part in (drift, velocity)]
-        left = energy - self._potential()
+        room = max(energy, min(left, kinetic[0] + self._potential())) - self._potential()
         if kinetic[1] > 0.0:
-            velocity = velocity * min(most, np.sqrt(max(0.0, (left - kinetic[0]) / kinetic[1])))
-        if kinetic[0] > max(0.0, left):
-            drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
+            velocity = velocity * min(most, np.sqrt(max(0.0, (room - kinetic[0]) / kinetic[1])))
+        if short := kinetic[0] > max(0.0, room) * (1.0 + 1e-12):
+            drift = drift * np.sqrt(max(0.0, room) / kinetic[0])
         self.velocity = drift + velocity
+        return short
 
-    def _react(self, given: Mapping[str, Array], paid: float, segments: Mapping[str, int]) -> None:
-        """Give the figure the impulses that things gave its segments while they went on, and at most an energy [J]."""
+    def _react(self, given: Mapping[str, Array], paid: float, segments: Mapping[str, int], left: float) -> bool:
+        """Give the figure the impulses that things gave its segments while they went on; arguments as of `_settle`.
+
+        True, and nothing changes, where that would take more energy than is left.
+        """
         if not given:
-            return
-        self.velocity, first = self._reacted(given, segments)[0], self._model.idx_vs
+            return False
+        before, first = self.velocity, self._model.idx_vs
+        self.velocity = self._reacted(given, segments)[0]
         pushed = self._inertia(self.q) @ self.velocity
         momenta = [self._data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
-        self._settle(paid, 1.0, momenta)
+        if short := self._settle(paid, 1.0, momenta, left):
+            self.velocity = before
+        return short
 
     def _reacted(self, given: Mapping[str, Array], segments: Mapping[str, int]) -> tuple[Array, float]:
         """The velocity (nv,) and energy [J] of the figure after impulses on its segments."""

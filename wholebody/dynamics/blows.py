@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -22,8 +22,8 @@ def left_for_later(
 ) -> bool:
     """Take back the impacts of a step with the figure, which the next step has at its start; whether only in part.
 
-    To the engine the figure is infinitely heavy, and would bring energy. Alternating blows, of which one depends on the
-    other, are taken back as far as things and figure together have no more energy than before.
+    To the engine the motion of the figure is given, which would bring energy. Alternating blows, of which one depends
+    on the other, are taken back as far as things and figure together have no more energy than before.
 
     Args:
         engine: after the step.
@@ -52,6 +52,23 @@ def left_for_later(
         # no share does: then that of the things alone, and the figure is slowed
         taken_back(share_below(energies[:, 0], most[0]) - share)
     return share < 1.0
+
+
+def undo(engine: RigidBodies, frame: EngineFrame, began: Mapping[str, Array], most: float) -> None:
+    """Give the things that were pushed in a step the velocities that they would have without; the next step has it all.
+
+    Args:
+        engine: after the step.
+        frame: the step.
+        began: things to the twists (6,) that weight alone would give them.
+        most: energy of the things before, J.
+    """
+    pushed = frame.wrenches.keys() & began.keys()
+    for name in pushed:
+        change = began[name] - engine.twist(name)
+        engine.push_about_centre(name, np.linalg.lstsq(engine.response(name), change, rcond=None)[0])
+    if (gain := engine.energy() - most) > 0.0:  # they are not where they would be
+        engine.state.slow(np.array([name in pushed for name in engine.names]), gain)
 
 
 def share_below(energies: Array, most: float) -> float:
