@@ -91,7 +91,8 @@ class Reach:
             if error > 0.97 * last:
                 converged = True
                 break
-            last, until = error, min(float(state[0]) + 25.0, float(most))  # near a goal convergence is linear, and sometimes slow
+            # near a goal convergence is linear, and sometimes slow
+            last, until = error, min(float(state[0]) + 25.0, float(most))
             while descend(*arrays, state, tolerance, until):
                 self._guards.keep()
                 pursuit.carry()
