@@ -225,8 +225,7 @@ class Articulated:
         if engine is None:
             return time, None, False
         held, places = points.held(bearing), self._touching.carried(segments, stood, stands)
-        fall = np.concatenate([time * self._gravity, np.zeros(3)])
-        unpushed = {name: engine.twist(name) + fall for name in engine.bodies}
+        unpushed = engine.state.bodies.twist + [*(time * self._gravity), 0.0, 0.0, 0.0]
         frame = engine.advance(time, places.and_others(motions), held, segments, BOUNCE if again else np.inf)
         given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
         ways = {name: places.way(name) for name in given}
