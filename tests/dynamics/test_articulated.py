@@ -264,6 +264,26 @@ def test_balls_that_meet_at_a_hand_keep_the_momentum_of_all(masses: tuple[float,
     assert len(hits) > 1
 
 
+@pytest.mark.parametrize("seed", [29, 38, 184])
+def test_a_light_hand_between_heavy_balls_keeps_the_momentum_of_all(seed: int) -> None:
+    """Its velocity was scaled where it had more energy than things that met it as something that is moved gave it."""
+    rng = np.random.default_rng(seed)
+    count = rng.integers(1, 6)
+    bounce, masses, balls = float(rng.choice([0.0, 0.3, 0.7, 1.0])), 10.0 ** rng.uniform(-1.0, 2.3, count), []
+    for k, mass in enumerate(masses):
+        off, side = np.array([*rng.uniform(-0.03, 0.03, 2), 0.2 + 0.1 * k]), 1.0 if k % 2 else -1.0
+        balls.append((off * (1.0, 1.0, side), mass, (0.0, 0.0, -side * rng.uniform(1.0, 5.0))))
+    material = wb.dynamics.Material("many", {"human": (bounce, 0.3), "many": (bounce, 0.3)})
+    moving, engine, segments = balls_at_hand(balls, material)
+    began, energy, size = engine.momentum()[:3], engine.energy(), 2.0 * np.sqrt(engine.energy() * masses.sum())
+    for _ in range(15):
+        moving.advance(moving.q, DT, {}, segments)
+        assert (engine.momentum() + moving.momentum())[:3] == pytest.approx(began, abs=1e-9 * size)
+        assert moving.energy() + engine.energy() < energy * (1.0 + 1e-9)
+        energy = moving.energy() + engine.energy()
+    assert moving.impulses or np.linalg.norm(moving.momentum()[:3]) > 0.1
+
+
 def test_a_ball_between_a_hand_and_a_table_is_held_there() -> None:
     hand = wb.load("hand")
     start = hand.posture("relaxed")

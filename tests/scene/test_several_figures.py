@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -392,3 +393,11 @@ def test_newton_takes_a_person_beside_an_arm_that_turns_without_end_and_slides(a
     solution = wb.solve(problem, "newton")
     assert solution.status == "solved"
     assert max(solution.assessment.goal_errors) < 1e-4
+
+
+def test_a_figure_is_neither_removed_nor_moved_as_a_thing(planar_arm: Any) -> None:
+    scene = wb.Scene({"one": planar_arm([0.3, 0.2]), "two": (planar_arm([0.3, 0.2]), (2.0, 0.0, 0.0))})
+    with pytest.raises(InputError, match="is a figure, which stays in its scene"):
+        scene.remove("one")
+    with pytest.raises(InputError, match="is a figure, which stays in its scene"):
+        scene.move("two", at=(1.0, 0.0, 0.0))

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import time
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import wholebody as wb
 from wholebody.dynamics.live_world import LiveWorld
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag
 from wholebody.view.live_page import LivePage
 
@@ -218,3 +222,21 @@ def test_a_joint_that_is_ticked_closes_and_one_that_cannot_is_told(tmp_path: Pat
         assert "do not close" not in drag.report().status
     finally:
         page.stop()
+
+
+def test_late_frames_of_a_world_are_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of ten frames one takes twice as long as there is; an hour's break is not made up for."""
+    now, made = [0.0], [0]
+
+    def go_on(_: Any) -> None:
+        made[0] += 1
+        now[0] += 3600.0 if made[0] == 100 else 2.0 * FRAME if made[0] % 10 == 0 else 0.25 * FRAME
+
+    def wait(seconds: float) -> None:
+        now[0] += seconds
+
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    stopped = SimpleNamespace(is_set=lambda: made[0] == 120, wait=wait)
+    world = object.__new__(LiveWorld)
+    LivePage._run(SimpleNamespace(_stopped=stopped, _lock=nullcontext(), drag=world, go_on=go_on))  # type: ignore[arg-type]
+    assert now[0] == pytest.approx(3600.0 + 118 * FRAME, abs=0.1 * FRAME)

@@ -37,6 +37,7 @@ TOGETHER = (
         "wholebody.dynamics.impulse_kernel",
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.ccd.sweep",
+        "wholebody.methods.ccd.guard_kernel",
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
         "wholebody.planning.multiplier_kernel",

@@ -24,9 +24,9 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross, with_values
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.blows import BOUNCE, left_for_later
+from wholebody.dynamics.blows import BOUNCE, undo
 from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques
-from wholebody.dynamics.frame import EngineFrame, Given, impacts
+from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.sleeping import AFTER, STILL
@@ -71,7 +71,6 @@ class Articulated:
         self.frames, self.ends = list[EngineFrame](), list[float]()
         self._tracked, self._asked, self._masses = self.q, b"", np.zeros((0, 0))
         self._turned, self._turning = 0.0, 0.0  # rad in the last step, rad/s
-        self._seats: tuple[Mapping[str, int], Indices, Array] | None = None  # of segments in their joints
         self._slow_for, self._beside = 0.0, list[str]()  # s; bodies that the last step was about
         own = pin.crba(self._model, self._data, self.q).diagonal()
         light = own < 1e-5  # kg m2: of links without mass; turns of axes that align have nearly none either
@@ -178,6 +177,7 @@ class Articulated:
         """A step of at most a time, of a `planned` one: by how much, what the things did, whether it led too deep."""
         model, engine = self._model, self._engine
         began, start, stood = self.energy(), self.velocity, self._touching.joints(self.q)
+        had = began + (0.0 if engine is None else engine.energy())
         points = self._touching.points(self.q, start, planned, moved)
         masses_begun = self._inertia(self.q)
         blow = self._bounce(masses_begun, points)
@@ -205,6 +205,7 @@ class Articulated:
         work = (blow * first.reshape(-1, 3) + bearing * last.reshape(-1, 3)).sum(axis=1)
         # what parts an overlap has its energy from nowhere
         work -= np.maximum(0.0, (bearing * parting.reshape(-1, 3)).sum(axis=1))
+        had += float(motor @ moves)
         paid = float(motor @ moves + work[points.driven].sum())
         rise = self._move(moves, drifted, np.inf if self.stiffness.any() else began + paid)
         if self._driven:
@@ -218,19 +219,20 @@ class Articulated:
         if self._sunk(points, ended, time, {name: way[1] for name, way in motions.items()}) and again:
             return time, None, True
         most = 1.0 if impulse.any() or self.stiffness.any() else 1.05
-        self._settle(began + paid, most, [momentum for momentum, _ in drifted])
+        things = 0.0 if engine is None else engine.energy()
+        if self._settle(began + paid, most, [momentum for momentum, _ in drifted], had - things) and again:
+            return time, None, True
         if engine is None:
             return time, None, False
-        held, places = points.held(bearing), self._carried(segments, stood, stands)
-        before = engine.energy(), self.energy()
+        held, places = points.held(bearing), self._touching.carried(segments, stood, stands)
+        unpushed = engine.state.bodies.twist + [*(time * self._gravity), 0.0, 0.0, 0.0]
         frame = engine.advance(time, places.and_others(motions), held, segments, BOUNCE if again else np.inf)
         given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
-        if not again and left_for_later(engine, frame, given, before, lambda some: self._reacted(some, segments)[1]):
-            paid = sum(before) - engine.energy()
-        else:
-            ways = {name: places.way(name) for name in given}
-            paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
-        self._react(given, paid, segments)
+        ways = {name: places.way(name) for name in given}
+        paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
+        late = not again and bool(impacts(frame.events, given, BOUNCE))
+        if late or self._react(given, paid, segments, had - engine.energy()):
+            undo(engine, frame, unpushed, had - self.energy())
         return time, frame, False
 
     def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
@@ -349,21 +351,12 @@ class Articulated:
             self.q, rise = np.array(pin.integrate(model, start, part)), most
         return rise
 
-    def _carried(self, segments: Mapping[str, int], before: Array, after: Array) -> Given:
-        """The motions of segments whose joints are at placements (joints, 4, 3) before and after."""
-        if self._seats is None or self._seats[0] is not segments:
-            frames = [self._model.frames[number] for number in segments.values()]
-            joints: Indices = np.array([frame.parentJoint for frame in frames], dtype=np.intp)
-            seats = np.array([frame.placement.homogeneous for frame in frames]).reshape(-1, 4, 4)
-            self._seats = segments, joints, seats
-        _, joints, seats = self._seats
-        placed = np.zeros((len(joints), 2, 4, 4))
-        placed[:, 0, :3], placed[:, 1, :3] = before[joints].transpose(0, 2, 1), after[joints].transpose(0, 2, 1)
-        placed[:, :, 3, 3] = 1.0
-        return Given(list(segments), placed @ seats[:, None])
+    def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force], left: float) -> bool:
+        """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`.
 
-    def _settle(self, energy: float, most: float, momenta: Sequence[pin.Force]) -> None:
-        """Give free roots their momenta, and scale other velocities so that the energy is at most `energy`."""
+        Momenta alone may take what is `left` of the energy of all that moves by itself, of which blows lose some. True
+        where that is not nearly enough for them.
+        """
         masses, roots, velocity = self._inertia(self.q), self._adrift, self.velocity
         pin.forwardKinematics(self._model, self._data, self.q)
         drift = np.zeros_like(velocity)
@@ -375,26 +368,28 @@ class Articulated:
             velocity[roots] = 0.0
             velocity[roots] = -impulse_kernel.by_inertia(locked, masses[roots] @ velocity)
         kinetic = [0.5 * float(part @ masses @ part) for part in (drift, velocity)]
-        left = energy - self._potential()
+        room = max(energy, min(left, kinetic[0] + self._potential())) - self._potential()
         if kinetic[1] > 0.0:
-            velocity = velocity * min(most, np.sqrt(max(0.0, (left - kinetic[0]) / kinetic[1])))
-        if kinetic[0] > max(0.0, left):
-            drift = drift * np.sqrt(max(0.0, left) / kinetic[0])
+            velocity = velocity * min(most, np.sqrt(max(0.0, (room - kinetic[0]) / kinetic[1])))
+        short = kinetic[0] - max(0.0, room)
+        if short > 0.0:
+            drift = drift * np.sqrt(max(0.0, room) / kinetic[0])
         self.velocity = drift + velocity
+        return bool(short > 1e-6 * self._data.mass[0])  # J/kg: what rests has less
 
-    def _react(self, given: Mapping[str, Array], paid: float, segments: Mapping[str, int]) -> None:
-        """Give the figure the impulses that things gave its segments while they went on, and at most an energy [J]."""
+    def _react(self, given: Mapping[str, Array], paid: float, segments: Mapping[str, int], left: float) -> bool:
+        """Give the figure the impulses that things gave its segments while they went on; arguments as of `_settle`.
+
+        True, and nothing changes, where that would take more energy than is left.
+        """
         if not given:
-            return
-        self.velocity, first = self._reacted(given, segments)[0], self._model.idx_vs
-        pushed = self._inertia(self.q) @ self.velocity
-        momenta = [self._data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
-        self._settle(paid, 1.0, momenta)
-
-    def _reacted(self, given: Mapping[str, Array], segments: Mapping[str, int]) -> tuple[Array, float]:
-        """The velocity (nv,) and energy [J] of the figure after impulses on its segments."""
-        inertia = self._inertia(self.q)
+            return False
+        before, first, inertia = self.velocity, self._model.idx_vs, self._inertia(self.q)
         joints = {name: self._model.frames[segments[name]].parentJoint for name in given}
         pushed = torques(self._model, self._data, self.q, [(joints[name], wrench) for name, wrench in given.items()])
-        velocity = self.velocity + impulse_kernel.by_inertia(inertia, pushed)
-        return velocity, 0.5 * float(velocity @ inertia @ velocity) + self._potential()
+        self.velocity = before + impulse_kernel.by_inertia(inertia, pushed)
+        pushed = inertia @ self.velocity
+        momenta = [self._data.oMi[k].act(pin.Force(pushed[first[k] : first[k] + 6])) for k in self._roots]
+        if short := self._settle(paid, 1.0, momenta, left):
+            self.velocity = before
+        return short

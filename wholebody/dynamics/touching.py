@@ -10,6 +10,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Moved, Points, approaches
+from wholebody.dynamics.frame import Given
 from wholebody.dynamics.pieces import Surfaces, needed, places
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN, TOUCH
@@ -40,7 +41,21 @@ class Touching:
         self._surfaces = Surfaces(scene, self._names)
         single = [(one.idx_q, one.idx_v) for one in model.joints[1:] if one.nq == one.nv == 1]  # [0]: the world
         self._limited: Indices = np.array(single, dtype=np.intp).reshape(-1, 2)
+        self._seats: tuple[Mapping[str, int], Indices, Array] | None = None  # of segments in their joints
         compiled_kernel()
+
+    def carried(self, segments: Mapping[str, int], before: Array, after: Array) -> Given:
+        """The motions of segments whose joints are at placements (joints, 4, 3) before and after."""
+        if self._seats is None or self._seats[0] is not segments:
+            frames = [self._model.frames[number] for number in segments.values()]
+            joints: Indices = np.array([frame.parentJoint for frame in frames], dtype=np.intp)
+            seats = np.array([frame.placement.homogeneous for frame in frames]).reshape(-1, 4, 4)
+            self._seats = segments, joints, seats
+        _, joints, seats = self._seats
+        placed = np.zeros((len(joints), 2, 4, 4))
+        placed[:, 0, :3], placed[:, 1, :3] = before[joints].transpose(0, 2, 1), after[joints].transpose(0, 2, 1)
+        placed[:, :, 3, 3] = 1.0
+        return Given(list(segments), placed @ seats[:, None])
 
     def points(self, q: Array, velocity: Array, time: float, moved: Moved) -> Points:
         """What the figure can touch within a time, at a posture (nq,) and a velocity (nv,), and limits in its reach."""

@@ -290,6 +290,8 @@ class SceneContents(checks.FixedAttributes):
         self._revision += 1
 
     def _object(self, name: str) -> SceneObject:
+        if isinstance(name, str) and name in self.figure.members:
+            raise InputError(f"{name!r} is a figure, which stays in its scene where it is; make another scene")
         return self._objects[checks.known(name, self._objects, "object")]
 
     def _new_name(self, name: str) -> str:

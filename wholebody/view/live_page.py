@@ -314,14 +314,16 @@ class LivePage:
             self._status.content = str(error)
 
     def _run(self) -> None:
+        due = time.perf_counter()
         while not self._stopped.is_set():
-            began = time.perf_counter()
             with self._lock:
                 if isinstance(self.drag, LiveWorld):
                     self.go_on(self.drag)
                 elif self._target is not None and (self._target is not self._reached):
                     self.follow(self._target)
-            self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
+            # a frame that was late is made up for by the next two, so that a world keeps time
+            due = max(due + FRAME, (now := time.perf_counter()) - 2.0 * FRAME)
+            self._stopped.wait(max(due - now, 0.001))
 
     def go_on(self, world: LiveWorld) -> None:
         """Make one frame of a world and show it."""

@@ -181,8 +181,7 @@ class ChainResolver:
         """Read a posture q (nq,), with the joint placements in `data`."""
         self.limbs.read(q, data)
         self.limbs.forward()
-        for guard in self._guards:
-            guard.read(q, data)
+        self._guards.read(q, data)
 
     def in_cones(self, data: Any) -> bool:
         """Whether the limbs are in their reach cones at the joint placements in `data`; `read` is not needed."""
@@ -190,8 +189,7 @@ class ChainResolver:
 
     def keep_ranges(self) -> None:
         """Bring limbs that have left their reach cones, or joints their ranges of motion, back into them."""
-        for guard in self._guards:
-            guard.keep()
+        self._guards.keep()
 
     def push(self, link: Link, tracked: Tracked | None = None) -> tuple[int, ...]:
         """Move the link out of the obstacle; the nodes that moved. Call `read` first."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.figures.figure import Figure
-from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, ReachCone, TwistRange
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, compiled_kernel, rotated, three
+from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, ReachCone, TwistRange
+from wholebody.methods.ccd.guard_kernel import CONE, ELLIPSE, ROW, SUM, TWIST, compiled_kernel
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, rotated, three
 from wholebody.methods.ccd.sweep import Aims
 
 
@@ -54,26 +56,70 @@ ROUNDING = 1e-12  # rad
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+class Tables(NamedTuple):
+    """Parts as arrays, see `guard_kernel`."""
+
+    parts: Array  # (k, 28)
+    wedges: Array  # (w, 9) of cones
+    angles: Array  # (a, 5) first and last of its terms, what they do not change, lower and upper limit
+    terms: Array  # (t, 2) node and factor
+
+
+class Part:
+    """What is kept: `read` it at a posture, ask whether it is `inside`, and `turn_back` its nodes.
+
+    Attributes:
+        nodes: those that can leave it.
+        sums: the angles that it is about.
+        wedges: (w, 9) of a cone.
+    """
+
+    def __init__(self, limbs: Limbs, nodes: tuple[int, ...], row: Array) -> None:
+        self.nodes, self._limbs, self._row, self._kernel = nodes, limbs, row, compiled_kernel()
+        self.sums: Sequence[_Sum] = ()
+        self.wedges = np.zeros((0, 9))
+
+    def place(self, tables: Tables, number: int) -> None:
+        """Be the row of a number in tables from now on."""
+        self._tables = with_values(tables, parts=tables.parts[number : number + 1])
+        self._tables.parts[0] = self._row
+        self._row = self._tables.parts[0]
+
+    def inside(self) -> bool:
+        """Whether it is kept, after `limbs.forward`."""
+        return bool(self._kernel.outside(*self._tables, self._limbs.frames, self._limbs.values) < 0)
+
+    @abstractmethod
+    def read(self, q: Array, data: Any) -> None:
+        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
+
+    @abstractmethod
+    def turn_back(self) -> None:
+        """Move the nodes, each within its limits, until it is kept, and call `limbs.forward`."""
+
+
 class _Sum:
     """A weighted sum of joint angles, of which some are nodes and the others stay as they are."""
 
-    def __init__(self, figure: Figure, limbs: Limbs, joints: dict[str, float]) -> None:
+    def __init__(self, figure: Figure, limbs: Limbs, joints: dict[str, float], axis: EllipseAxis | None = None) -> None:
         ids = {figure.joint_id(name): factor for name, factor in joints.items()}
         self.nodes = tuple(limbs.node_of[joint] for joint in ids if joint in limbs.node_of)
         self.factors = np.array([factor for joint, factor in ids.items() if joint in limbs.node_of])
         self._others = [
             (figure.model.joints[joint].idx_q, factor) for joint, factor in ids.items() if joint not in limbs.node_of
         ]
-        self._limbs, self._rows, self._rest = limbs, np.array(self.nodes, dtype=np.intp), 0.0
+        self._limbs, self._rows = limbs, np.array(self.nodes, dtype=np.intp)
+        self._offset, *limits = (0.0, -np.inf, np.inf) if axis is None else (axis.offset, axis.lower, axis.upper)
+        self.row = np.array([0.0, 0.0, self._offset, *limits])  # of `Tables.angles`
 
     def read(self, q: Array) -> None:
         """Read the joints that are no nodes from the posture q (nq,)."""
-        self._rest = sum(factor * float(q[place]) for place, factor in self._others)
+        self.row[2] = self._offset + sum(factor * float(q[place]) for place, factor in self._others)
 
     @property
     def value(self) -> float:
-        """The sum, radians."""
-        return self._rest + float(self.factors @ self._limbs.values[self._rows])
+        """The sum, radians, with the offset of its axis."""
+        return float(self.row[2] + self.factors @ self._limbs.values[self._rows])
 
     def lessen(self, excess: float) -> None:
         """Change the sum by -excess by the least change of the nodes; what a limit stops is left to the others."""
@@ -93,93 +139,78 @@ class _Sum:
             excess -= gone
 
 
-class _SumsGuard:
-    """Keeps sums of joint angles; `nodes` are those that change them."""
+class SumsGuard(Part):
+    """Keeps sums of joint angles."""
 
-    def __init__(self, limbs: Limbs, sums: Sequence[_Sum]) -> None:
-        self._limbs, self._sums = limbs, sums
-        self.nodes = tuple(node for angle in sums for node in angle.nodes)
+    def __init__(self, limbs: Limbs, sums: Sequence[_Sum], kind: float, bound: float) -> None:
+        row = np.zeros(ROW)
+        row[0], row[27] = kind, bound
+        super().__init__(limbs, tuple(node for angle in sums for node in angle.nodes), row)
+        self.sums = sums
 
     def read(self, q: Array, data: Any) -> None:
-        """Read what the limbs do not move at the posture q (nq,)."""
-        for angle in self._sums:
+        """See `Part.read`."""
+        for angle in self.sums:
             angle.read(q)
 
 
-class CoupledGuard(_SumsGuard):
+class CoupledGuard(SumsGuard):
     """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
-        self._sum, self._bound = _Sum(figure, limbs, dict(part.joints)), part.bound
-        super().__init__(limbs, [self._sum])
-
-    def inside(self) -> bool:
-        """Whether the sum is within its bound."""
-        return self._sum.value <= self._bound + ROUNDING
+        self._bound = part.bound
+        super().__init__(limbs, [_Sum(figure, limbs, dict(part.joints))], SUM, part.bound + ROUNDING)
 
     def turn_back(self) -> None:
         """Move the joints by the least that is needed, each within its limits, and call `limbs.forward`."""
-        self._sum.lessen(self._sum.value - self._bound)
+        self.sums[0].lessen(self.sums[0].value - self._bound)
         self._limbs.forward()
 
 
-class EllipticGuard(_SumsGuard):
+class EllipticGuard(SumsGuard):
     """Keeps angles on or in an ellipse; see `EllipticRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: EllipticRange) -> None:
-        super().__init__(limbs, [_Sum(figure, limbs, dict.fromkeys(axis.joints, 1.0)) for axis in part.axes])
-        self._axes = list(zip(self._sums, part.axes, strict=True))
-
-    def inside(self) -> bool:
-        """Whether the angles are in the ellipse."""
-        return self._square() <= 1.0
+        sums = [_Sum(figure, limbs, dict.fromkeys(axis.joints, 1.0), axis) for axis in part.axes]
+        super().__init__(limbs, sums, ELLIPSE, 1.0)
 
     def turn_back(self) -> None:
         """Scale the angles to the edge, each joint within its limits, and call `limbs.forward`."""
-        less = 1.0 - (1.0 - INWARD) / self._square() ** 0.5
-        for angle, axis in self._axes:
-            angle.lessen(less * (axis.offset + angle.value))
+        tables = self._tables
+        square = float(self._kernel.square(self._row, tables.angles, tables.terms, self._limbs.values))
+        less = 1.0 - (1.0 - INWARD) / square**0.5
+        for angle in self.sums:
+            angle.lessen(less * angle.value)
         self._limbs.forward()
 
-    def _square(self) -> float:
-        """The sum of the squares of the angles, each as a share of its limit."""
-        shares = []
-        for angle, axis in self._axes:
-            value = axis.offset + angle.value
-            shares.append(value / (axis.upper if value > 0.0 else axis.lower))
-        return sum(share * share for share in shares)
 
-
-class LimbGuard:
+class LimbGuard(Part):
     """Keeps the direction or the turn of a limb in a reference frame; `nodes` are those that turn it there."""
 
-    def __init__(self, figure: Figure, limbs: Limbs, limb: str, reference: str) -> None:
-        self._limbs, self._kernel = limbs, compiled_kernel()
+    def __init__(self, figure: Figure, limbs: Limbs, limb: str, reference: str, kind: float) -> None:
         self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (limb, reference))
-        self._ends = self._limb.node, self._base.node
-        self.nodes = limbs.between(self._base.node, self._limb.node)
+        row = np.zeros(ROW)
+        row[:3] = kind, self._limb.node, self._base.node
+        super().__init__(limbs, limbs.between(self._base.node, self._limb.node), row)
         self._turns()
 
     def read(self, q: Array, data: Any) -> None:
-        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
+        """See `Part.read`."""
         if self._limb.read(data) | self._base.read(data):
             self._turns()
 
     def _turns(self) -> None:
         """Note the rotations (9,) of both frames in their nodes."""
-        self._own, self._turn = (np.array(frame.placement[:9]) for frame in (self._limb, self._base))
+        self._row[5:14], self._row[14:23] = (frame.placement[:9] for frame in (self._limb, self._base))
 
 
 class TwistGuard(LimbGuard):
     """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
-        self._part, self._slope = part, np.array(part.slope @ part.center)
-        super().__init__(figure, limbs, part.limb, part.reference)
-
-    def inside(self) -> bool:
-        """Whether the twist is within its bound, after `limbs.forward`."""
-        return self._excess() <= 0.0
+        self._part = part
+        super().__init__(figure, limbs, part.limb, part.reference, TWIST)
+        self._row[23:] = *(part.slope @ part.center), part.sign, part.bound
 
     def turn_back(self) -> None:
         """Turn the limb about its long axis, whose direction decides the bound, and call `limbs.forward`."""
@@ -191,19 +222,11 @@ class TwistGuard(LimbGuard):
 
     def _turns(self) -> None:
         super()._turns()
-        self._turn = (self._turn.reshape(3, 3) @ self._part.center).ravel()  # the central rotation
+        self._row[14:23] = (self._row[14:23].reshape(3, 3) @ self._part.center).ravel()  # the central rotation
 
     def _excess(self) -> float:
         """The twist beyond its bound, radians; negative inside."""
-        part = self._part
-        return float(
-            self._kernel.twist_beyond(
-                self._limbs.frames, *self._ends, self._own, self._turn, self._slope, part.sign, part.bound
-            )
-        )
-
-
-RangeGuard = CoupledGuard | EllipticGuard | TwistGuard
+        return float(self._kernel.twist_beyond(self._row, self._limbs.frames))
 
 
 class ConeGuard(LimbGuard):
@@ -216,20 +239,16 @@ class ConeGuard(LimbGuard):
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
         cone = figure.cones[name]
         self._polygon, self._axis = Polygon(cone.cone), np.asarray(cone.axis, dtype=float)
-        super().__init__(figure, limbs, cone.limb, cone.reference)
+        super().__init__(figure, limbs, cone.limb, cone.reference, CONE)
+        self.wedges = self._polygon.wedges
 
     def _turns(self) -> None:
         super()._turns()
-        self._local = self._own.reshape(3, 3) @ self._axis  # the axis in the node's frame
+        self._row[5:8] = self._row[5:14].reshape(3, 3) @ self._axis  # the axis in the node's frame
 
     def holds(self, data: Any) -> bool:
         """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
         return self._polygon.contains(three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
-
-    def inside(self) -> bool:
-        """Whether the limb is in its cone, after `limbs.forward`."""
-        frames = self._limbs.frames
-        return bool(self._kernel.limb_in_cone(self._polygon.wedges, frames, *self._ends, self._local, self._turn))
 
     def turn_back(self) -> None:
         """Turn the joints of the limb to the nearest direction of its cone, and call `limbs.forward`."""
@@ -238,61 +257,86 @@ class ConeGuard(LimbGuard):
         Aims(self._limbs, [self._limb.node], [local], [target], [False]).sweep_until(self.nodes, self.inside)
 
 
-Part = ConeGuard | RangeGuard
-"""What is kept: `read` it at a posture, ask whether it is `inside`, and `turn_back` its `nodes`."""
+class Guards:
+    """Keeps cones and ranges of some limbs.
 
+    Attributes:
+        inside: (n,) the last values of all nodes that left nothing, NaN where there were none.
+        tables: the parts as arrays, those that share nodes one after the other.
+    """
 
-class Guard:
-    """Keeps cones and ranges that share nodes."""
-
-    def __init__(self, limbs: Limbs, parts: Sequence[Part]) -> None:
-        self.parts, self._limbs = tuple(parts), limbs
-        self._rows = np.array(sorted({node for part in parts for node in part.nodes}), dtype=np.intp)
-        self._last: Array | None = None
-        self._seen = b""  # its bytes
+    def __init__(self, limbs: Limbs, groups: Sequence[Sequence[Part]]) -> None:
+        """Take the parts in groups that share no nodes."""
+        self._limbs, self._kernel, self._groups = limbs, compiled_kernel(), groups
+        self.inside = np.full(len(limbs.values), np.nan)
+        self._rows = [
+            np.array(sorted({node for part in group for node in part.nodes}), dtype=np.intp) for group in groups
+        ]
+        self._parts = [part for group in groups for part in group]
+        sums = [angle for part in self._parts for angle in part.sums]
+        terms = [(node, factor) for angle in sums for node, factor in zip(angle.nodes, angle.factors, strict=True)]
+        wedges = np.vstack([np.zeros((0, 9)), *(part.wedges for part in self._parts)])
+        self.tables = Tables(
+            np.zeros((len(self._parts), ROW)),
+            wedges,
+            np.zeros((len(sums), 5)),
+            np.reshape(terms, (-1, 2)).astype(float),
+        )
+        terms_before = wedges_before = sums_before = 0
+        for number, part in enumerate(self._parts):
+            counted = (wedges_before, len(part.wedges)) if len(part.wedges) else (sums_before, len(part.sums))
+            part.place(self.tables, number)
+            self.tables.parts[number, 3:5] = counted[0], sum(counted)
+            for place, angle in enumerate(part.sums, sums_before):
+                angle.row[:2] = terms_before, terms_before + len(angle.nodes)
+                self.tables.angles[place] = angle.row
+                angle.row, terms_before = self.tables.angles[place], terms_before + len(angle.nodes)
+            wedges_before, sums_before = wedges_before + len(part.wedges), sums_before + len(part.sums)
 
     def read(self, q: Array, data: Any) -> None:
         """Begin at the posture q (nq,) with its placements in `data`, after `limbs.read` and `limbs.forward`."""
-        self._last, self._seen = None, b""
-        for part in self.parts:
+        for part in self._parts:
             part.read(q, data)
-        self._remember()
+        self.inside.fill(np.nan)
+        for group, rows in zip(self._groups, self._rows, strict=True):
+            if all(part.inside() for part in group):
+                self.inside[rows] = self._limbs.values[rows]
 
-    def keep(self) -> bool:
-        """Bring the nodes back inside, after `limbs.forward`, and call it; true if they are inside then."""
-        if self._remember():
-            return True
-        for _ in range(2):  # to bring a limb back into one may take it out of another
-            for part in self.parts:
-                if not part.inside():
-                    part.turn_back()
-            if self._remember():
-                return True
-        if self._last is not None:
-            self._limbs.values[self._rows] = self._last
-            self._limbs.forward()
-        return self._remember()
+    def keep(self) -> None:
+        """Bring the nodes back inside, or to where they last were, after `limbs.forward`, and call it."""
+        if not self.kept():
+            for group, rows in zip(self._groups, self._rows, strict=True):
+                self._keep(group, rows)
 
-    def _remember(self) -> bool:
-        """Whether all parts are inside, which the nodes' values alone decide; the last ones inside are kept."""
-        values = self._limbs.values[self._rows]
-        seen = values.tobytes()  # numpy takes five times as long to compare so few
-        if seen != self._seen:
-            for part in self.parts:
-                if not part.inside():
-                    return False
-            self._last, self._seen = values, seen
+    def kept(self) -> bool:
+        """Whether nothing is left, after `limbs.forward`; `inside` has these values then."""
+        limbs = self._limbs
+        if self._kernel.outside(*self.tables, limbs.frames, limbs.values) >= 0:
+            return False
+        self.inside[:] = limbs.values
         return True
 
+    def _keep(self, group: Sequence[Part], rows: Indices) -> None:
+        for _ in range(2):  # to bring a limb back into one may take it out of another
+            for part in group:
+                if not part.inside():
+                    part.turn_back()
+            if all(part.inside() for part in group):
+                self.inside[rows] = self._limbs.values[rows]
+                return
+        if not np.isnan(self.inside[rows]).any():
+            self._limbs.values[rows] = self.inside[rows]
+            self._limbs.forward()
 
-def guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[Guard]:
+
+def guards(figure: Figure, limbs: Limbs, kept: Kept) -> Guards:
     """Guards of the kept cones and ranges that these limbs can leave."""
     groups: list[list[Part]] = []
     for part in (*cone_guards(figure, limbs, kept), *range_guards(figure, limbs, kept.ranges)):
         sharing = [group for group in groups if any(set(part.nodes) & set(other.nodes) for other in group)]
         groups = [group for group in groups if group not in sharing]
         groups.append([*(other for group in sharing for other in group), part])
-    return [Guard(limbs, group) for group in groups]
+    return Guards(limbs, groups)
 
 
 def cone_guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[ConeGuard]:
@@ -301,7 +345,7 @@ def cone_guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[ConeGuard]:
     return [guard for guard in made if guard.nodes]
 
 
-def range_guards(figure: Figure, limbs: Limbs, names: Sequence[str]) -> list[RangeGuard]:
+def range_guards(figure: Figure, limbs: Limbs, names: Sequence[str]) -> list[Part]:
     """The named ranges that these limbs can leave."""
     kinds: dict[type, Any] = {CoupledRange: CoupledGuard, EllipticRange: EllipticGuard, TwistRange: TwistGuard}
     made = [kinds[type(figure.ranges[name])](figure, limbs, figure.ranges[name]) for name in names]

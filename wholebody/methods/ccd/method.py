@@ -18,7 +18,7 @@ from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit, unseen
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
-from wholebody.methods.ccd.terms import BY_DEFAULT, Request, read
+from wholebody.methods.ccd.terms import BY_DEFAULT, Paths, Request, read
 from wholebody.methods.conclusion import Descends, DescentTracker, Ending
 from wholebody.methods.contradictions import NEAREST, contradictions, least_left
 from wholebody.methods.control import Control
@@ -133,6 +133,7 @@ class _Shared:
     def __init__(self, scene: Scene, workspace: Workspace) -> None:
         self.workspace, self._scene = workspace, scene
         self._key: tuple[object, ...] = ()
+        self.paths: Paths = {}
 
     def ready(self, request: Request, control: Control) -> tuple[Reach, OverlapResolver]:
         """Both, made anew if the request moves or keeps something else than the last one."""
@@ -151,7 +152,7 @@ class _Search(Multistart[_Trial]):
     def __init__(self, method: CCD, problem: Problem, shared: _Shared, control: Control) -> None:
         super().__init__(control)
         self._method, self._problem = method, problem
-        self._request = read(problem, shared.workspace.state)
+        self._request = read(problem, shared.workspace.state, shared.paths)
         self._reach, self._resolver = shared.ready(self._request, control)
         self._tolerance = min(TOLERANCE, SHARE * method.tolerance)
         self._resolver.begin(problem.clearances, self._tolerance, control)

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.methods.ccd.guard_kernel import compiled_kernel
 from wholebody.methods.ccd.guards import guards
 from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, moved, rotated
 from wholebody.methods.ccd.sweep import Aims
@@ -46,19 +47,18 @@ class _Pursuit:
                     weight = 0.5 * lever * lever * goal.weight
                     rows.append((carried.node, own, to.node, there, False, weight, goal.half))
         nodes, local, bases, targets, points, weights, halves = zip(*rows, strict=True) if rows else ((),) * 7
-        self._targets = Aims(limbs, bases, targets, np.zeros((len(rows), 3)), points)
-        self.aims = Aims(limbs, nodes, local, self._targets.here, points, weights)
-        self._moving = any(half is not None for half in halves)
+        where = Aims(limbs, bases, targets, np.zeros((len(rows), 3)), points)
+        self.aims = Aims(limbs, nodes, local, where.here, points, weights)
         # factors of all aims in each half of a sweep: one of two frames moves while the other one is its target
         still = [1 - half for half in (0, 1)] if {0, 1} <= set(halves) else [-1]
-        self.halves = [np.where([part == half for part in halves], 0.0, weights) for half in still]
+        moving = np.array([np.where([part == half for part in halves], 0.0, weights) for half in still])
+        # for `descend`: aims and their nodes, targets and theirs, factors in each half of a sweep
+        self.arrays = *self.aims.arrays, *where.arrays, moving.reshape(len(still), -1)
+        self._frames = limbs.frames
 
     def carry(self) -> None:
         """Update where aims and targets are, after `limbs.forward`."""
-        if self._moving:
-            self._targets.carry()
-            self.aims.there[:] = self._targets.here
-        self.aims.carry()
+        compiled_kernel().carry_both(self._frames, *self.arrays[:4])
 
 
 class Reach:
@@ -80,33 +80,25 @@ class Reach:
         limbs = self.limbs
         q = q.copy()
         self._read(q)
-        for guard in self._guards:
-            guard.read(q, self._data)
-            guard.keep()
+        self._guards.read(q, self._data)
+        self._guards.keep()
         pursuit = _Pursuit(limbs, self._data, self._goals)
-        aims = pursuit.aims
-        plan = aims.plan()
-        error, last = aims.error, inf
-        sweeps, converged = 0, not len(plan.turns)
-        while error > tolerance and sweeps < most and not converged and not self._control.over:
-            if sweeps % 25 == 0:  # near a goal convergence is linear, and sometimes slow
-                converged = error > 0.97 * last
-                last = error
-                if converged:
-                    break
-            change = 0.0
-            for weights in pursuit.halves:
-                aims.weights[:] = weights
-                change = max(change, aims.sweep(plan))
-                limbs.forward()
-                for guard in self._guards:
-                    guard.keep()
+        plan, descend = pursuit.aims.plan(), compiled_kernel().descend
+        arrays = limbs.arrays, pursuit.arrays, tuple(plan), tuple(self._guards.tables), self._guards.inside
+        error, last, state = pursuit.aims.error, inf, np.zeros(3)  # sweeps, halves of one, largest change
+        converged = not len(plan.turns)
+        while error > tolerance and state[0] < most and not converged and not self._control.over:
+            if error > 0.97 * last:
+                converged = True
+                break
+            # near a goal convergence is linear, and sometimes slow
+            last, until = error, min(float(state[0]) + 25.0, float(most))
+            while descend(*arrays, state, tolerance, until):
+                self._guards.keep()
                 pursuit.carry()
-            error = aims.error
-            sweeps += 1
-            converged = change < 1e-9
+            error, converged = pursuit.aims.error, bool(state[2] < 1e-9)
         limbs.write(q)
-        return q, Reached(error, sweeps, converged)
+        return q, Reached(error, int(state[0]), converged)
 
     def error(self, q: Array) -> float:
         """Largest error of the goals at a posture q (nq,), metres or radians."""

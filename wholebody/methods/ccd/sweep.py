@@ -44,6 +44,11 @@ class Aims:
         self.weights[:], self._rows[:, 10] = 1.0 if weights is None else weights, points
         self.carry()
 
+    @property
+    def arrays(self) -> tuple[Array, Indices]:
+        """(m, 11) where each is, target, factor, in its node's frame, is a point; and the nodes (m,)."""
+        return self._rows, self._nodes
+
     def carry(self) -> None:
         """Update where they are, after `limbs.forward`."""
         self._kernel.carry(self._limbs.frames, self._nodes, self._rows)

@@ -21,6 +21,9 @@ from wholebody.tasks.frame import Frame, Hold, Orientation, Relative
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
+Paths = dict[str, tuple[int, ...]]
+"""Frame to the joints that `reaching` finds."""
+
 BY_DEFAULT = ReachCones, RangeOfMotion
 """What it keeps of what people have by default."""
 
@@ -49,9 +52,13 @@ class Request:
     loops: tuple[GoalPlace, ...] = ()  # those of the goals that must be met: what is held by frames that move
 
 
-def read(problem: Problem, state: State | None = None) -> Request:
-    """Convert a problem; `state`, if given, is moved to its start. An UnsupportedTermError lists all such terms."""
-    reader = _Reader(problem, State(problem.scene.model) if state is None else state)
+def read(problem: Problem, state: State | None = None, paths: Paths | None = None) -> Request:
+    """Convert a problem; `state`, if given, is moved to its start. An UnsupportedTermError lists all such terms.
+
+    `paths`, if given, has what earlier calls found for the same figure.
+    """
+    paths = {} if paths is None else paths
+    reader = _Reader(problem, State(problem.scene.model) if state is None else state, paths)
     goals = reader.goals()
     loops = reader.loops()
     cones, ranges = reader.constraints()
@@ -65,8 +72,8 @@ def read(problem: Problem, state: State | None = None) -> Request:
 class _Reader:
     """Reads the terms of one problem: what is `refused`, in words, and the joints that move and that must not."""
 
-    def __init__(self, problem: Problem, state: State) -> None:
-        self._problem, self._figure, self._state = problem, problem.scene.figure, state
+    def __init__(self, problem: Problem, state: State, paths: Paths) -> None:
+        self._problem, self._figure, self._state, self._paths = problem, problem.scene.figure, state, paths
         self.refused: list[str] = []
         self.joints: set[int] = set()
         self._closed: set[int] = set()  # identities of holds that are met as goals
@@ -79,13 +86,19 @@ class _Reader:
         for number, goal in enumerate(self._problem.goals):
             where = f"goals[{number}], {type(goal).__name__}"
             if isinstance(goal, (Point, Frame, Orientation)):
-                self._move(where, goal.frame, reaching(self._figure, goal.frame))
+                self._move(where, goal.frame, self._reaching(goal.frame))
                 found.append(_goal_place(goal))
             elif isinstance(goal, Relative):
                 found += self._relative(where, goal.frame, goal.to, goal)
             else:
                 self.refused.append(where)
         return tuple(found)
+
+    def _reaching(self, frame: str) -> tuple[int, ...]:
+        """See `reaching`."""
+        if frame not in self._paths:
+            self._paths[frame] = reaching(self._figure, frame)
+        return self._paths[frame]
 
     def _move(self, where: str, frame: str, joints: Iterable[int]) -> None:
         path = [joint for joint in joints if joint not in self.fixed]
@@ -109,7 +122,7 @@ class _Reader:
         """A goal between two frames: the joints of both move, but for those that move both."""
         place, base = term.residual.place.joint, term.residual.base.joint
         apart = set.symmetric_difference(*(set(self._figure.model.supports[joint]) for joint in (place, base)))
-        paths = [apart.intersection(reaching(self._figure, name)) for name in (frame, to)]
+        paths = [apart.intersection(self._reaching(name)) for name in (frame, to)]
         self._move(where, frame, set().union(*paths))
         return [one for one, path in zip(_ends(term), paths, strict=True) if not path <= self.fixed]
 

@@ -125,6 +125,7 @@ class LooseBodies:
     detail = "own"
     postures = ()
     visual = None
+    members = ()
     outer = ()
     name = "assembly"
 
