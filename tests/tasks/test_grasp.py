@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.tasks.grips import opened
+from wholebody.tasks.grips import Oblique, opened
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
 AT = (0.40, -0.2, 1.1)
@@ -242,6 +242,38 @@ def test_the_hand_is_where_along_says(along: float) -> None:
     assert palm[2] - 1.1 == pytest.approx(along * 0.215, abs=1e-3)
 
 
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+@pytest.mark.parametrize(("degrees", "off"), [(-15.0, 15.0), (0.0, 0.0), (12.0, 0.0), (20.0, 0.0), (50.0, 30.0)])
+def test_a_bar_lies_in_a_fist_up_to_20_degrees_from_across_the_palm(
+    side: str, sign: float, degrees: float, off: float
+) -> None:
+    """On the side of the thumb it is nearer to the fingers; beyond, the first angle is what is too much."""
+    figure = wb.load("human")
+    palm = figure.placement(figure.neutral, f"{side}_palm")
+    scene = wb.Scene(figure).add(wb.Capsule(0.02, 0.4), name="bar", at=(0.4, 0.0, 1.1))
+    grasp = wb.Grasp(side, "bar", "power").resolve(scene, figure.neutral)
+    thumb = palm.actInv(figure.placement(figure.neutral, f"{side}_thumb_tip").translation)[1]
+    assert thumb * sign > 0.0
+    way = np.array((np.sin(np.radians(degrees)), sign * np.cos(np.radians(degrees)), 0.0))  # of the end at the thumb
+    turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), palm.rotation @ way)
+    scene.move("bar", at=pin.SE3(turn.matrix(), palm.act(np.array((0.0, 0.0, 0.02)))))
+    found = grasp.value(scene.state(figure.neutral))
+    np.testing.assert_allclose(np.degrees(np.abs(found[1:3])), (off, 0.0), atol=1e-5)
+
+
+def test_a_bar_is_held_from_being_turned_beyond_the_range() -> None:
+    """The planes that keep a hand within the range are its angle from both ends, with their derivatives."""
+    scene, grip, q = _at_a_ring()
+    model, state, half = scene.model, scene.state(q), 1e-6
+    q = pin.integrate(model, q, 0.01 * np.random.default_rng(3).normal(size=model.nv))
+    planes = next(part for part in grip.parts if isinstance(part, Oblique)).planes
+    given = planes(state.update(q))
+    assert given.value.sum() == pytest.approx(-np.radians(20.0))
+    for way in np.eye(model.nv)[:6]:
+        ahead, behind = (planes(state.update(pin.integrate(model, q, side * half * way))).value for side in (1.0, -1.0))
+        np.testing.assert_allclose((ahead - behind) / (2.0 * half), given.jacobian @ way, atol=1e-6)
+
+
 def test_a_wheel_is_held_by_its_rim_from_outside() -> None:
     figure = wb.load("human")
     scene = wb.Scene(figure).add(wb.Torus(0.18, 0.015), name="wheel", at=(0.45, 0.0, 1.1))
@@ -254,7 +286,9 @@ def test_a_wheel_is_held_by_its_rim_from_outside() -> None:
         outwards = np.array((*palm.translation[:2], 0.0)) / np.hypot(*palm.translation[:2])
         assert np.hypot(*palm.translation[:2]) > 0.18
         assert palm.rotation[:, 2] @ outwards < 0.0  # the palm looks inwards
-        assert abs(palm.rotation[:, 1] @ np.cross(outwards, (0.0, 0.0, 1.0))) > 0.9999  # the rim crosses it
+        rim = sign * palm.rotation.T @ np.cross((0.0, 0.0, 1.0), outwards)  # it crosses the palm, in its plane
+        assert -1e-4 < np.arctan2(sign * rim[0] * np.sign(rim[1]), abs(rim[1])) < np.radians(20.0) + 1e-4
+        assert abs(rim[2]) < 1e-4
         assert sign * palm.translation[1] > 0.0
 
 

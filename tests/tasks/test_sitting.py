@@ -145,16 +145,31 @@ def test_a_line_says_how_people_sit_kneel_and_stand_on_things(line: str, given: 
 
 
 @pytest.mark.parametrize("start", ["supine", "standing"])
-def test_somebody_lies_on_the_back(start: str) -> None:
-    man = wb.load("human", stature=1.74, mass=100.0)
-    lying = [wb.tasks.Lean("floor", part=part, side=(-1, 0, 0)) for part in ("pelvis", "thorax")]
-    solution = wb.solve(wb.Problem(room(man), start, constraints=lying))
+@pytest.mark.parametrize("given", [("male", 1.74, 100.0), ("male", 1.75, 120.0), ("female", 1.6, 95.0)])
+def test_somebody_lies_on_the_back(start: str, given: tuple[str, float, float]) -> None:
+    """With a level pelvis too, heavy people had to arch the spine more than it bends."""
+    one = wb.load("human", sex=given[0], stature=given[1], mass=given[2])
+    lying = [wb.Touch(part, "floor") for part in ("pelvis", "left_heel", "right_heel")]
+    solution = wb.solve(wb.Problem(room(one), start, constraints=[wb.tasks.Lean("floor"), *lying]))
     assert solution.solved, solution.message
-    for part in ("pelvis", "thorax"):
-        assert man.placement(solution.q, part).rotation[2, 0] > 0.99  # its front looks up
-    heights = [man.placement(solution.q, frame).translation[2] for frame in ("head_top", "left_heel", "right_heel")]
-    assert min(heights) > 0.0
-    assert max(heights) < 0.2
+    assert one.placement(solution.q, "thorax").rotation[2, 0] > 0.99  # its front looks up
+    assert one.placement(solution.q, "pelvis").rotation[2, 0] > np.cos(np.radians(25.0))
+    assert 0.0 < one.placement(solution.q, "head_top").translation[2] < 0.2
+    assert max(np.degrees(one.joint_values(solution.q)[f"{side}_knee_flexion"]) for side in ("left", "right")) < 15.0
+
+
+@pytest.mark.parametrize("given", [("female", 1.53, 50.0), ("male", 1.87, 110.0), ("male", 1.75, 120.0)])
+def test_somebody_sits_cross_legged(given: tuple[str, float, float]) -> None:
+    one = wb.load("human", sex=given[0], stature=given[1], mass=given[2])
+    crossed = [wb.Touch("left_foot", "right_shank"), wb.Touch("right_foot", "left_shank")]
+    solution = wb.solve(wb.Problem(room(one), "cross_legged", constraints=[wb.Sit("floor"), *crossed]))
+    assert solution.solved, solution.message
+    pelvis = one.placement(solution.q, "pelvis")
+    left, right = (pelvis.actInv(one.placement(solution.q, f"{side}_ankle").translation) for side in ("left", "right"))
+    assert right[1] > left[1]  # the feet are on the other sides
+    assert right[0] > left[0] + 0.05  # the right one ahead of the left one
+    knees = [pelvis.actInv(one.placement(solution.q, f"{side}_knee").translation)[1] for side in ("left", "right")]
+    assert knees[0] - knees[1] > 0.45  # apart
 
 
 def driving(person: wb.Figure) -> wb.Problem:

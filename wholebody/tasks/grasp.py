@@ -19,7 +19,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Near, Over, Part, owner_pairs
 from wholebody.tasks.faces import face
-from wholebody.tasks.grips import Crossing, Looking, Opposing, bar_of, rim_of, rounded
+from wholebody.tasks.grips import Crossing, Looking, Oblique, Opposing, bar_of, rim_of, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, joined, segments_beyond, surface
 from wholebody.tasks.touch import check_apart
 
@@ -40,12 +40,13 @@ class Grasp(ContactTerm):
 
     - "palm": the flat hand lies on a face of the thing. The hand touches it, z looks into the face, and the palm is
       over the face, a tenth within its edges. The hand may turn about z.
-    - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
-      touches the thing. A ring, such as a wheel, is held by its rim: anywhere in the quarter on the hand's side, along
-      the tangent there, with the palm outside of it, within 45 degrees. Where the hand has fingers, the two outer parts
-      of each touch the thing too, and the thumb opposes the four fingers; around a bar thinner than 23 mm the thumb
-      lies over the fingers, which oppose the palm. One thinner than 16 mm lies in the fingers: its far side is at most
-      16 mm from the palm.
+    - "power": the hand is around a bar: the thing's longest axis crosses the palm, and the hand touches the thing. It
+      lies along y, or, where the hand is one segment, up to 20 degrees from y, nearer to the fingers on the thumb's
+      side, as handles lie in a fist. A ring, such as a wheel, is held by its rim: anywhere in the quarter on the
+      hand's side, along the tangent there, with the palm outside of it, within 45 degrees. Where the hand has fingers,
+      the two outer parts of each touch the thing too, and the thumb opposes the four fingers; around a bar thinner than
+      23 mm the thumb lies over the fingers, which oppose the palm. One thinner than 16 mm lies in the fingers: its far
+      side is at most 16 mm from the palm.
     - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the figure has such
       segments, otherwise their tips, which have to move apart.
     - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
@@ -149,6 +150,10 @@ class Grasp(ContactTerm):
         low, high = self._room(float(bar.half[2]))
         fingers = self._outer_parts(scene)
         y, z = np.array((0.0, 1.0, 0.0)), np.array((0.0, 0.0, 1.0))
+        # rad: in a fist a handle is 102 (standard deviation 7) degrees from the forearm of a straight wrist (Barter,
+        # Emanuel and Truett 1957, recalled). Fingers with joints close around it squarely.
+        oblique = np.radians(20.0) if self._side == "left" else -np.radians(20.0)
+        turned = Oblique(place, bar, min(0.0, oblique), max(0.0, oblique))
         thickness = 2.0 * float(bar.half[1])
         # m: thumb and fingers close around a bar of 5 cm that crosses the palm's middle. Thinner ones lie beside it,
         # and thicker ones, around which the thumb reaches less.
@@ -156,7 +161,7 @@ class Grasp(ContactTerm):
         parts: list[Part] = [
             # m: thickness that closed fingers leave in front of the palm; a thinner bar lies in the fingers
             Near(hand, thing, 0.016 - thickness) if fingers and thickness < 0.016 else Gap(hand, thing),
-            Facing(place, across(y), bar, z, either=True),
+            Facing(place, across(y), bar, z, either=True) if fingers else turned,
             Crossing(place, bar, low, high, room),
         ]
         if rim is not None:

@@ -19,7 +19,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.hull import coal_convex, coal_triangles
 from wholebody.geometry.pieces import swept_points
-from wholebody.tasks.axis import across
+from wholebody.tasks.axis import across, equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import SupportingPlanes, filled
 from wholebody.tasks.contact_parts import Gap, Near, between, beyond, ends, no_planes, through
 from wholebody.tasks.faces import Face
@@ -150,6 +150,49 @@ class Crossing(NamedTuple):
     def _room(self) -> tuple[Array, Array]:
         """Ranges (2,) of what is across the palm, and of how far the bar's middle is along the bar."""
         return np.array([-self.across, -self.high]), np.array([self.across, -self.low])
+
+
+class Oblique(NamedTuple):
+    """A bar in the plane of the palm, turned in it within a range from the palm's y: two rows [rad].
+
+    The first is how far the bar is turned beyond the range, about the palm's z from y to x; the second its angle to the
+    plane. Either way along the bar will do.
+    """
+
+    place: Place  # the palm
+    bar: Face | Rim  # the bar
+    low: float  # [rad]
+    high: float
+    in_radians: tuple[bool, ...] = (True, True)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The two angles, and moments."""
+        way, turned, axes = self._turned(state)
+        least = min(max(turned, self.low), self.high)
+        c, s = np.cos(least), np.sin(least)
+        basis = np.array([(c, -s, 0.0), (0.0, 0.0, 1.0), (s, c, 0.0)]) @ axes
+        components = (basis @ way).tolist()
+        values, slopes = equidistant_error(*components), equidistant_jacobian(*components) @ basis
+        if self.low < turned < self.high:
+            values[0], slopes[0] = 0.0, 0.0
+        wrench = np.zeros((2, 6))
+        wrench[:, 3:] = slopes @ pin.skew(way)
+        return values, self.bar.rows(state, wrench, self.place.joint)
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The ends of the range."""
+        way, turned, axes = self._turned(state)
+        x, y, _ = axes @ way
+        wrench = np.zeros((1, 6))
+        wrench[0, 3:] = (y * axes[0] - x * axes[1]) @ pin.skew(way) / max(x * x + y * y, SHORTEST)
+        rows = self.bar.rows(state, wrench, self.place.joint)
+        return ends(np.array([turned]), rows, np.array([self.low]), np.array([self.high]))
+
+    def _turned(self, state: State) -> tuple[Array, float, Array]:
+        """The bar's direction (3,) nearer to the palm's y, its angle from y in the palm, and the palm's axes (3, 3)."""
+        way, axes = self.bar.at(state)[1][2], state.frame(self.place.frame).rotation.T
+        way = -way if axes[1] @ way < 0.0 else way
+        return way, float(np.arctan2(axes[0] @ way, axes[1] @ way)), axes
 
 
 class Ahead(NamedTuple):

@@ -50,7 +50,7 @@ def test_a_descent_that_spent_its_programs_beside_the_contact_goes_on() -> None:
     method = wb.methods.QP(measures=False, time_limit=30.0, iterations=3)  # from before contact it takes four
     solution = wb.solve(problem_set("drivers").make(15, 0).problem, method)
     assert solution.solved, solution
-    assert sum(entry.note.startswith("before contact") for entry in solution.trace) <= 40
+    assert sum(entry.note.startswith("before contact") for entry in solution.trace) <= 60
 
 
 def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
@@ -105,3 +105,30 @@ def test_the_plane_of_a_face_of_flesh_spreads_no_more() -> None:
     goal = wb.Sit("ben/left_thigh", pelvis="anna/pelvis", trunk="anna/thorax")
     ahead = approached(goal.resolve(scene, scene.figure.neutral), 0.01)
     assert np.isfinite(ahead.error(scene.state(scene.figure.neutral))).all()
+
+
+@pytest.mark.parametrize("style", ["stoop", "free", "squat"])
+def test_nobody_bends_backwards_to_a_crate(style: str) -> None:
+    """Knees that stay straight lead away from a squat, and the first posture that met all bent back over the crate."""
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.3, 0.4, 0.3)), name="crate", at=(0.45, 0.0, 0.16))
+    grips = [wb.Grasp(side, "crate") for side in ("left", "right")]
+    measures = [wb.Effort(), wb.tasks.Rhythm(style=style)]  # type: ignore[arg-type]
+    solution = wb.solve(wb.Problem(scene, goals=grips, constraints=[wb.Stand("floor")], measures=measures))
+    assert solution.solved, solution
+    # the trunk's axis dips ahead: by more in a stoop
+    assert figure.placement(solution.q, "thorax").rotation[0, 2] > (0.8 if style == "stoop" else 0.4)
+
+
+def test_a_foot_on_a_step_is_ahead_of_the_other() -> None:
+    """A descent without things led a man past the step, with the foot behind him on it, at twice the measure."""
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.3, 0.6, 0.25)), name="step", at=(0.35, 0.0, 0.125))
+    stands = [wb.Stand("floor", feet=["right_foot"]), wb.Stand("step", feet=["left_foot"], balance=False)]
+    solution = wb.solve(wb.Problem(scene, constraints=stands))
+    assert solution.solved, solution
+    bent = figure.joint_values(solution.q)
+    assert bent["left_hip_flexion"] > 0.8
+    assert bent["left_knee_flexion"] > 0.8

@@ -284,8 +284,9 @@ class QPMultistart(Search):
             return
         begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
         starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
-        # a descent to a contact takes ten times as long; the second start is half way to the limits
-        least = self._through_measure or self._below_things(() if count or self._touches else islice(starts, 1, 2))
+        # the second start is half way to the limits; to contacts from the first one nobody is bent back or astride
+        more = () if count else [self._start] if self._touches else islice(starts, 1, 2)
+        least = self._through_measure or self._below_things(more)
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
             most = 0 if self._touches else int(SEARCH.dear * dear)

@@ -184,7 +184,8 @@ class SearchNumbers(NamedTuple):
     cheap: int = 60  # programs that starts for lower measures may take beside as many as before. More: lower, slower.
     width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
     less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
-    less_of_contacts: float = 0.5  # the same where terms are contacts, whose descents take ten times as long
+    # the same where terms are contacts, whose descents take ten times as long. More: only the best is begun from.
+    less_of_contacts: float = 0.9
 
 
 class StepNumbers(NamedTuple):
