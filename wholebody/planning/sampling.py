@@ -55,7 +55,7 @@ class Sampler:
         return self._drawn.pop()
 
     def limb(self, q: Array, dofs: Indices) -> Array:
-        """A posture (nq,) of which most of some degrees of freedom (k,) are a part of the way from q to a random one."""
+        """A posture (nq,) of which most of some freedoms (k,) are a part of the way from q to a random one."""
         model, rng = self._figure.model, self._rng
         there = np.asarray(pin.difference(model, q, self.turned(self.anywhere(), q)))
         away, moved = np.zeros(model.nv), dofs[rng.uniform(size=len(dofs)) < 0.8]
