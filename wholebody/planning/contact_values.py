@@ -69,8 +69,12 @@ class ContactValues(ComputedTogether):
                     low.append(sides[0][begin:end])
                     high.append(sides[1][begin:end])
                 begin = end
-        self._low = np.concatenate([[one.low for one in (*rows, *gaps)], *low])
-        self._high = np.concatenate([[one.high for one in (*rows, *gaps)], *high])
+        ends = np.array([one[-2:] for one in (*rows, *gaps)], dtype=float).reshape(-1, 2)
+        self._low: Array
+        self._high: Array
+        self._low, self._high = (
+            np.concatenate([mine, *theirs]) for mine, theirs in zip(ends.T, (low, high), strict=True)
+        )
         self._joint, self._other = np.array([row[:2] for row in rows], dtype=np.intp).reshape(-1, 2).T
         self._place, self._axis, self._origin = np.array([row[2:5] for row in rows]).reshape(-1, 3, 3).swapaxes(0, 1)
         self._point = np.array([row.point for row in rows], dtype=float).reshape(-1, 1)
