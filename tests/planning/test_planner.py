@@ -25,6 +25,7 @@ from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.methods.control import BUDGET
 from wholebody.planning import Pace, Plan
+from wholebody.planning.contact_values import ContactValues, joined_contacts
 from wholebody.planning.ends import nearer
 from wholebody.planning.local_planner import Geodesics
 from wholebody.planning.multiplier_kernel import projected_gauss_seidel
@@ -35,6 +36,7 @@ from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, places, refined, shortcut
 from wholebody.planning.tightening import DAMPING, programmed, tighten
 from wholebody.planning.tracked_motions import TrackedMotions
+from wholebody.tasks.contact_parts import TermOfParts
 
 
 def shelf(number: int) -> tuple[wb.Problem, Array]:
@@ -674,6 +676,26 @@ def test_a_free_root_keeps_to_the_usual_speed(free_bodies: Callable[..., wb.Figu
     assert np.abs(np.diff(found.clip.q[:, 0])).max() * 60.0 == pytest.approx(2.0, rel=0.01)
 
 
+class Slow(wb.tasks.Bound):
+    """No freedom moves by more from one frame to the next."""
+
+    def __init__(self, most: float, second: bool) -> None:
+        self.most, self.second = most, second  # rad, or rad/s
+
+    def bounds(self, state: Any, dt: float | None) -> tuple[Array, Array]:
+        most = np.full(state.model.nv, np.inf if self.second and dt is None else self.most * (dt or 1.0) ** self.second)
+        return -most, most
+
+
+@pytest.mark.parametrize(("most", "second"), [(0.01, False), (0.5, True)])
+def test_a_bound_of_ones_own_limits_the_steps_from_frame_to_frame(most: float, second: bool) -> None:
+    scene = wb.Scene(wb.load("hand"))
+    found = wb.plan(scene, "open", "grip", constraints=[Slow(most, second)])
+    assert found.solved, found.message
+    steps = np.diff(found.clip.q, axis=0)
+    assert 0.9 * most < np.abs(steps).max() / (found.clip.dt if second else 1.0) <= 1.001 * most
+
+
 def test_what_is_frozen_stays_and_a_goal_that_moves_it_is_refused() -> None:
     scene = wb.Scene(wb.load("human"))
     figure, given = scene.figure, [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze("left_arm")]
@@ -829,6 +851,29 @@ def test_who_sits_reaches_behind_a_screen(least_distance: Distance) -> None:
         state = scene.state(q)
         assert max(np.abs(term.value(state)).max() for term in given) <= 1e-4
     assert least_along(scene, found.clip.q, least_distance) >= -5e-4
+
+
+def test_contact_terms_as_arrays_hold_where_the_terms_do_and_have_the_derivatives_of_their_values() -> None:
+    """At postures of a person who sits at a desk, and beside these; ranges are bounds, and their rows no kinks."""
+    problem, end = seated()
+    rng, model = np.random.default_rng(0), problem.scene.model
+    contacts = [term for term in problem.constraints if isinstance(term, TermOfParts)]
+    with problem.borrow() as workspace:
+        (joined,) = (
+            each for each in joined_contacts(problem.constraints, workspace) if isinstance(each, ContactValues)
+        )
+        state = workspace.state
+        for size, here in [(0.0, problem.start), (0.0, end), *((0.02, problem.start) for _ in range(5))]:
+            q = pin.integrate(model, here, size * rng.normal(size=model.nv))
+            values, rows = joined.value_and_jacobian(state.update(q), joined.value)
+            missed = np.sort(np.maximum(joined.lower - values, values - joined.upper).clip(min=0.0))
+            worst = max(np.abs(term.value(state)).max() for term in contacts)
+            assert missed[-1] == pytest.approx(worst, abs=2e-5, rel=0.01)
+            away, step = rng.normal(size=model.nv), 1e-6
+            ends = [joined.value(state.update(pin.integrate(model, q, side * step * away))) for side in (1.0, -1.0)]
+            wrong = np.abs((ends[0] - ends[1]) / (2.0 * step) - rows @ away)
+            # distances have kinks where corners of a sole are as deep as others, to which the rows are the slope
+            assert (wrong < 1e-4).sum() >= len(values) - 4
 
 
 def test_what_a_constraint_lets_touch_needs_no_room() -> None:

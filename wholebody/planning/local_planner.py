@@ -18,6 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import largest_approach, pair_kinds
 from wholebody.geometry.continuous.moved_pairs import kept_apart
 from wholebody.methods.control import BUDGET
+from wholebody.planning.contact_values import joined_contacts
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import ConstraintValues
@@ -64,13 +65,14 @@ class Geodesics:
         # of every kind of pairs by every freedom
         pairs, self._kind = pair_kinds(workspace.table)
         self._approach = np.asarray(largest_approach(workspace.table, centres, np.eye(self._model.nv), pairs))
-        state, terms = workspace.state.update(problem.start), problem.constraints
+        self.terms = terms = joined_contacts(problem.constraints, workspace)
+        state = workspace.state.update(problem.start)
         self._values = ConstraintValues(terms, state)
         each = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         sides, inwards = np.hstack([np.zeros((2, 0)), *each]), np.array([[1.0], [-1.0]])
         room = np.full(len(self._least), MARGIN)
         # what a constraint lets touch is as near as that says, and between two postures as near as at an end
-        brought = frozenset(pair for term in terms for pair in term.touching)
+        brought = frozenset(pair for term in problem.constraints for pair in term.touching)
         touching = problem.scene.built.between(brought) if brought else np.zeros(len(room), dtype=bool)
         self._least[touching], room[touching] = -MISSED - self.bent, MISSED + self.bent - 2.0 * NOISE
         self._kept = Kept(sides + INSIDE * inwards, room)

@@ -35,7 +35,7 @@ from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal
-from wholebody.tasks.bounds import StepLimit
+from wholebody.tasks.bounds import Freeze, StepLimit
 
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
@@ -280,8 +280,10 @@ class _Judge:
         """The motion along parts (m, nq) of a path as fast as the limits allow, each from rest to rest; its figures."""
         scene, pace = self.problem.scene, self._pace
         # the last posture of a part is the first of the next one: a step of rest, in which no acceleration adds up
-        q = np.concatenate([Timing(scene.figure, part, pace).within(local.corrected) for part in parts])
-        use = used(scene.figure, q, pace)
+        # what is frozen is judged by its place
+        own = [bound for bound in self.problem.bounds if not isinstance(bound, Freeze)]
+        q = np.concatenate([Timing(scene.figure, part, pace, own).within(local.corrected) for part in parts])
+        use = used(scene.figure, q, pace, own)
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
         for frame in q:  # as far as the first that misses something
             if not worst <= KEPT or BUDGET.over:
@@ -292,6 +294,7 @@ class _Judge:
             f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
             f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
             f"accelerations reach {use.acceleration:.3g} of their limit" if not use.acceleration <= OVER else "",
+            f"steps from frame to frame reach {use.step:.3g} of what a bound lets them" if not use.step <= OVER else "",
         ]
         late = BUDGET.over
         if not (late or any(faults)):
@@ -303,7 +306,9 @@ class _Judge:
         if late:
             faults = ["the time limit ended the judgement of a motion"]
         said = "; ".join(fault for fault in faults if fault)
-        return Plan(Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use)
+        return Plan(
+            Clip(scene.figure, q, pace.dt, "plan"), not said, said, length(scene.model, list(q)), worst, *use[:2]
+        )
 
     def _between(self, end: Array) -> Problem:
         """The problem with clearances of pairs that are nearer at an end (nq,) as they are there."""

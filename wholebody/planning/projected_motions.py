@@ -23,9 +23,10 @@ from wholebody.planning.projection_kernel import displace
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.point import Point
-from wholebody.terms.linearisation import ConstraintValues, Lineariser
+from wholebody.terms.linearisation import ConstraintValues, Lineariser, PackedLinearisation
 
 STEP = 0.05  # rad, m: of a freedom between two projections; larger = farther from what is held in between, cheaper
+WITHIN = 1e-4  # m, rad: by which an iteration brings values within sides that it finds them beyond
 ITERATIONS = 8  # of a projection, which takes two or three from a step
 
 
@@ -44,17 +45,18 @@ class ProjectedMotions(Geodesics):
         self.partial = False  # what is held takes all joints along
         self.shares = np.ones(self._model.nv)
         bare = problem.with_start(problem.start)
-        bare.goals = bare.measures = ()
+        bare.goals, bare.measures, bare.constraints = (), (), self.terms
         self._lineariser = bare.lineariser(workspace)
         self._aimed = bare.with_start(problem.start)
-        self._reach: Lineariser | None = None
-        terms, state = problem.constraints, workspace.state.update(problem.start)
+        self._aimed.constraints = self.terms
+        self._reach = dict[str, Lineariser]()  # of each tip
+        terms, state = self.terms, workspace.state.update(problem.start)
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
         self._away = np.zeros(self._model.nv)
         self._on = set[bytes]()  # postures that were seen to be on what is held
-        self._last = b"", self._away  # the posture that was linearised last, and its values of constraints
+        self._last = b"", self._packed(problem.start, -1.0)  # the posture that was linearised last, and what is there
         # of steps: contacts, which take most of the time of a posture, are equalities
         loose = [not (term.lower == term.upper).all() for term in terms]
         self._loose = ConstraintValues([term for term, asked in zip(terms, loose, strict=True) if asked], state)
@@ -72,7 +74,7 @@ class ProjectedMotions(Geodesics):
 
         Pairs that two postures of a path keep apart may overlap by the square of a step in between.
         """
-        at = self._lineariser.packed(q, 1e-3)  # m: farther than frames are displaced
+        at = self._packed(q, 1e-3)  # m: farther than frames are displaced
         aims = np.hstack([self._bounds, np.vstack([at.clearance - MISSED, np.full(len(at.gap), np.inf)])])
         never = np.array([[np.inf], [-np.inf]]) + np.zeros_like(aims)
         displace(at.jacobian, np.hstack([at.value, at.gap]), never, aims, at.box, self._away)
@@ -84,8 +86,14 @@ class ProjectedMotions(Geodesics):
         least = np.maximum(self._least + MISSED + self.bent, 0.0)
         self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
 
+    def _aims(self) -> Array:
+        """(2, c) where an iteration brings values: to sides alone, rounding would leave them beyond."""
+        sides = self._kept.sides
+        room = np.minimum(WITHIN, 0.5 * (sides[1] - sides[0]))
+        return np.where(self._equal, self._bounds, sides + room * np.array([[1.0], [-1.0]]))
+
     def _projected(self, q: Array) -> Array | None:
-        aims = np.where(self._equal, self._bounds, self._kept.sides)
+        aims = self._aims()
         for _ in range(ITERATIONS):
             q, missed = self._displaced(q, self._kept.sides, aims)
             if not missed:
@@ -98,8 +106,8 @@ class ProjectedMotions(Geodesics):
         if kept is self._followed or key in self._on:
             values, sides = self._loose.at(state), kept.sides[:, self._rows]
         else:
-            known, values = self._last
-            values, sides = values if known == key else self._values.at(state), kept.sides
+            known, at = self._last
+            values, sides = at.value if known == key else self._values.at(state), kept.sides
             on = values[self._equal], sides[:, self._equal]
             if (on[0] >= on[1][0]).all() and (on[0] <= on[1][1]).all():
                 self._on.add(key)
@@ -108,13 +116,14 @@ class ProjectedMotions(Geodesics):
     def reaching(self, q: Array, tip: str, place: Array) -> Array:
         """The posture (nq,) near q with a frame at a place (3,), on what is held, as nearly as a few iterations get."""
         goal = Point(tip, place).resolve(self._aimed.scene, q)
-        if self._reach is None:
+        if tip not in self._reach:
             self._aimed.goals = (goal,)
-            self._reach = self._aimed.lineariser(self._workspace)
-        self._reach.take((goal,), self._reach.clearances)
-        aims = np.hstack([np.zeros((2, 3)), np.where(self._equal, self._bounds, self._kept.sides)])
+            self._reach[tip] = self._aimed.lineariser(self._workspace)
+        reach = self._reach[tip]
+        reach.take((goal,), reach.clearances)
+        aims = np.hstack([np.zeros((2, 3)), self._aims()])
         for _ in range(6):  # more = nearer to places out of reach, dearer
-            at = self._reach.packed(q, -1.0)
+            at = reach.packed(q, -1.0)
             if not displace(at.jacobian, at.value, aims, aims, at.box, self._away):
                 break
             size = float(np.abs(self._away).max())
@@ -123,10 +132,15 @@ class ProjectedMotions(Geodesics):
                 break
         return q
 
+    def _packed(self, q: Array, within: float) -> PackedLinearisation:
+        """What is at q (nq,), until the next question."""
+        at = self._lineariser.packed(q, within)
+        self._last = q.tobytes(), at
+        return at
+
     def _displaced(self, q: Array, sides: Array, aims: Array) -> tuple[Array, bool]:
         """A posture (nq,) after one iteration, and whether it was needed, as constraints were not within sides."""
-        at, away = self._lineariser.packed(q, -1.0), self._away  # no pairs
-        self._last = q.tobytes(), at.value
+        at, away = self._packed(q, -1.0), self._away  # no pairs
         needed = displace(at.jacobian, at.value, sides, aims, at.box, away)
         return (np.asarray(pin.integrate(self._model, q, away)), True) if needed else (q, False)
 
@@ -147,7 +161,7 @@ class ProjectedMotions(Geodesics):
             size = float(np.abs(motion).max(initial=0.0))
             last = size <= STEP and self.met(target)
             share = min(1.0, STEP / max(size, 1e-15))
-            there = target if last else self._projected(np.asarray(pin.integrate(self._model, q, share * motion)))
+            there = target if last else self._projected(self._along(q, share * motion))
             if there is None or not self._leads(q, there):
                 break
             way.append(there)
@@ -159,6 +173,19 @@ class ProjectedMotions(Geodesics):
             if left > before - 0.1 * share * before:  # what is held does not let it nearer
                 break
         return way, False
+
+    def _along(self, q: Array, motion: Array) -> Array:
+        """The posture (nq,) after the part of a motion (nv,) that keeps what is held to first order, where it is known.
+
+        It is known at the posture that was projected last, and spares an iteration.
+        """
+        known, at = self._last
+        if known == q.tobytes():
+            rows = at.jacobian[: len(at.value)]
+            value, box = at.value + rows @ motion, at.box - motion
+            if displace(rows, value, self._kept.sides, self._aims(), box, self._away):
+                motion = motion + self._away
+        return np.asarray(pin.integrate(self._model, q, motion))
 
     def _leads(self, q: Array, there: Array) -> bool:
         """Whether a step from q to a posture (nq,) is short, as one is that does not jump, and free."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.self_pairs import random_postures
 from wholebody.methods.simplification import still_dofs
 from wholebody.problem import Problem
@@ -53,6 +53,15 @@ class Sampler:
             # postures that are drawn at once, which takes a hundredth of drawing each
             self._drawn = list(random_postures(self._figure.model, 256, int(self._rng.integers(2**31))))
         return self._drawn.pop()
+
+    def limb(self, q: Array, dofs: Indices) -> Array:
+        """A posture (nq,) of which most of some freedoms (k,) are a part of the way from q to a random one."""
+        model, rng = self._figure.model, self._rng
+        there = np.asarray(pin.difference(model, q, self.turned(self.anywhere(), q)))
+        away, moved = np.zeros(model.nv), dofs[rng.uniform(size=len(dofs)) < 0.8]
+        away[moved] = rng.uniform() * there[moved]
+        away[self._frozen] = 0.0
+        return np.asarray(pin.integrate(model, q, away))
 
     def near(self, q: Array, spread: float) -> Array:
         """A posture (nq,) whose joints are a fraction of the way from q to a random one; roots within `ROOM`."""

@@ -27,7 +27,10 @@ AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
-REACHED = 0.3  # of the samples beside what is held: a tip is displaced, and all else follows; more = less else is tried
+ASIDE = (
+    0.6  # of the samples beside what is held: a limb that moves, or its tip, is elsewhere; more = less else is tried
+)
+LIMBS = 0.7  # of these: joints of the limb are random; of others its tip is displaced, and all else follows
 POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
 
 
@@ -162,8 +165,8 @@ class Search:
             share = float(np.clip(self._rng.uniform(-0.5, 1.5), 0.0, 1.0))
             middle = np.asarray(pin.interpolate(model, start, near, share))
             sample = self._sampler.near(middle, self._spread(trees.samples))
-            if isinstance(self._local, ProjectedMotions) and self._rng.uniform() < REACHED:
-                sample = self._displaced(self._local, middle, near)
+            if isinstance(self._local, ProjectedMotions) and self._rng.uniform() < ASIDE:
+                sample = self._aside(self._local, middle, near)
             if most < np.inf and self._apart(start, sample) + min(self._apart(sample, q) for q in ends) > most:
                 continue
             path = trees.grow(sample)
@@ -171,12 +174,13 @@ class Search:
                 return path, trees
         return None, trees
 
-    def _displaced(self, local: ProjectedMotions, q: Array, end: Array) -> Array:
-        """A posture (nq,) near q that meets what is held, with one of the tips that the motion moves somewhere else.
+    def _aside(self, local: ProjectedMotions, q: Array, end: Array) -> Array:
+        """A posture (nq,) near q with one of the limbs that the motion moves, or its tip, somewhere else.
 
-        What carries a thing round another one has few freedoms: joints at random seldom move all of a body that way.
+        What gets round a thing has few freedoms: joints at random seldom move all of a body that way, and differences
+        of others hide which posture of a tree is near.
         """
-        figure = self._problem.scene.figure
+        figure, rng = self._problem.scene.figure, self._rng
         chains, key = list(figure.chains.values()), end.tobytes()
         if key not in self._moved:
             ends = (self._problem.start, end)
@@ -185,10 +189,12 @@ class Search:
         far = self._moved[key]
         if not far.any():
             return q
-        chain = chains[self._rng.choice(len(chains), p=far / far.sum())]
+        chain = chains[rng.choice(len(chains), p=far / far.sum())]
+        if rng.uniform() < LIMBS:
+            return self._sampler.limb(q, figure.dofs(chain.joints))
         *joints, at = (figure.placement(q, name).translation for name in (*chain.joints, chain.tip))
-        way = self._rng.normal(size=3)
-        way *= self._rng.uniform() * np.linalg.norm(np.diff([*joints, at], axis=0), axis=1).sum() / np.linalg.norm(way)
+        way = rng.normal(size=3)
+        way *= rng.uniform() * np.linalg.norm(np.diff([*joints, at], axis=0), axis=1).sum() / np.linalg.norm(way)
         return local.reaching(q, chain.tip, at + way)
 
     def _spread(self, samples: int) -> float:

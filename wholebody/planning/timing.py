@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -20,9 +21,11 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
 from wholebody.methods.control import BUDGET
 from wholebody.motion.trajectory.retiming import passed
 from wholebody.planning.smoothing import places
+from wholebody.tasks.base import Bound
 
 
 @dataclass(frozen=True)
@@ -55,11 +58,15 @@ class Pace(Checked):
         return own if self.velocity is None else np.minimum(own, self.velocity)
 
 
+STILL = 1e-7  # rad, m: a displacement that counts as none
+
+
 class Timing:
     """When the places of a path are passed: a cubic spline through postures (m, nq), from rest to rest."""
 
-    def __init__(self, figure: Figure, path: Array, pace: Pace) -> None:
-        self._figure, self._path, self._pace = figure, path, pace
+    def __init__(self, figure: Figure, path: Array, pace: Pace, bounds: Sequence[Bound] = ()) -> None:
+        """Take a path (m, nq), and bounds of the displacement from frame to frame."""
+        self._figure, self._path, self._pace, self._bounds = figure, path, pace, bounds
         knots = np.arange(len(path))
         self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))
         limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
@@ -82,9 +89,9 @@ class Timing:
                     if BUDGET.over:
                         return q
                     q[k] = corrected(q[k])
-            use = used(self._figure, q, self._pace)
-            over = max(use.velocity, np.sqrt(use.acceleration))
-            if over <= 1.0 and exact:
+            use = used(self._figure, q, self._pace, self._bounds)
+            over = max(use.velocity, np.sqrt(use.acceleration), use.step)
+            if (over <= 1.0 and exact) or not np.isfinite(over):
                 break
             exact = exact or over <= 1.0
             slower *= 1.001 * max(over, 1.0)
@@ -103,18 +110,33 @@ def least_time(figure: Figure, path: Sequence[Array], pace: Pace) -> float:
 
 
 class Use(NamedTuple):
-    """The largest velocity and acceleration of a motion in parts of their limits."""
+    """The largest velocity, acceleration and displacement between two frames of a motion in parts of their limits."""
 
     velocity: float
     acceleration: float
+    step: float = 0.0
 
 
-def used(figure: Figure, q: Array, pace: Pace) -> Use:
+def used(figure: Figure, q: Array, pace: Pace, bounds: Sequence[Bound] = ()) -> Use:
     """What postures (frames, nq) use, by their differences; they begin and end at rest."""
     speed, still = velocities(figure.model, q, pace.dt), np.zeros((1, figure.model.nv))
     change = np.diff(np.concatenate([still, speed, still]), axis=0) / pace.dt
     fast = np.abs(speed) / pace.fastest(figure)
-    return Use(float(fast.max(initial=0.0)), float(np.abs(change).max(initial=0.0) / pace.acceleration))
+    step = max((_step(figure, q, pace, bound) for bound in bounds), default=0.0)
+    return Use(float(fast.max(initial=0.0)), float(np.abs(change).max(initial=0.0) / pace.acceleration), step)
+
+
+def _step(figure: Figure, q: Array, pace: Pace, bound: Bound) -> float:
+    """The largest displacement between two of postures (frames, nq) in parts of what a bound lets it be."""
+    state, most = State(figure.model), 0.0
+    for here, there in pairwise(q):
+        low, high = bound.bounds(state.update(here), pace.dt)
+        away = np.asarray(pin.difference(figure.model, here, there))
+        moves = np.abs(away) > STILL
+        limit = np.maximum(np.where(away > 0.0, high, -low), 0.0)[moves]
+        with np.errstate(divide="ignore"):
+            most = max(most, float((np.abs(away[moves]) / limit).max(initial=0.0)))
+    return most
 
 
 def squared_rates(first: Array, second: Array, velocity: Array, acceleration: Array) -> Array:

@@ -59,7 +59,9 @@ class TrackedMotions:
         self._resting = self._problem.with_start(problem.start)
         self._resting.goals = self._resting.measures = ()
         self._settling = QP(restarts=0).tracker(self._resting, 1.0)
-        self._lineariser = self._resting.lineariser(workspace)
+        seen = self._resting.with_start(problem.start)
+        seen.goals, seen.measures, seen.constraints = (), (), self.geodesics.terms
+        self._lineariser = seen.lineariser(workspace)
 
     def admit(self, q: Array) -> None:
         """See `Geodesics`."""
