@@ -140,16 +140,29 @@ class Recursion:
         self._whole = whole
         last = len(self.q) - 1
         points = sorted({0, last, *evaluation})
-        for frame in [frame for frame in points if self.bad[frame]]:
+        corrected = [frame for frame in points if self.bad[frame]]
+        for frame in corrected:
             self._key(frame)
             if self._ended():
                 return
         self.keys.update(points)
+        for frame in corrected:
+            if frame not in self.stuck:
+                self._fill_around(frame)
         for low, high in pairwise(points):
             self._between(low, high)
 
     def _ended(self) -> bool:
         return self._run.ended or bool(self.stuck and not self._whole)
+
+    def _fill_around(self, frame: int) -> None:
+        """Interpolate frames that overlap beside a corrected point, up to the first free one or another key."""
+        for step in (-1, 1):
+            end = frame + step
+            while 0 <= end < len(self.q) and self.bad[end] and end not in self.keys:
+                end += step
+            if 0 <= end < len(self.q):
+                self._fill(min(frame, end), frame, max(frame, end))
 
     def _between(self, low: int, high: int) -> None:
         waiting = [(low, high)]
