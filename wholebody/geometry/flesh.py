@@ -57,12 +57,21 @@ class Flesh(NamedTuple):
 
     def placed(self, geometry: pin.GeometryModel, joints: Any) -> pin.SE3:
         """Where it is in the world, with the joints at Pinocchio's placements."""
-        trunk, column = divmod(self.trunk, NUMBERS)
-        pieces = [geometry.geometryObjects[k] for k in (trunk, self.piece - 1, self.piece)]
-        places = [joints[one.parentJoint] * one.placement for one in pieces]
-        rows = np.array([np.vstack([at.rotation.T, at.translation]) for at in places])
-        spread((Flesh(2, NUMBERS + 6, column, self.sign),), rows, rows.reshape(-1))
-        return pin.SE3(rows[2, :3].T, rows[2, 3])
+        number, column = divmod(self.trunk, NUMBERS)
+        trunk, limb, own = (geometry.geometryObjects[k] for k in (number, self.piece - 1, self.piece))
+        joint, carrier = joints[own.parentJoint], joints[trunk.parentJoint]
+        straight = joint * limb.placement
+        axis = carrier.rotation @ trunk.placement.rotation[:, column // 3]
+        cosine = self.sign * float(axis @ straight.rotation[:, 2])
+        if cosine >= STRAIGHT:
+            return straight
+        bent = joint * own.placement
+        if cosine <= BENT:
+            return bent
+        share = (STRAIGHT - cosine) / (STRAIGHT - BENT)
+        ends = [np.vstack([at.rotation.T, at.translation]) for at in (straight, bent)]
+        now = between(ends[0], ends[1], share * share * (3.0 - 2.0 * share))
+        return pin.SE3(now[:3].T, now[3])
 
 
 class Spreading(NamedTuple):

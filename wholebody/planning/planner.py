@@ -226,7 +226,8 @@ def _smoothed(judge: _Judge, local: LocalPlanner, path: list[Array]) -> Plan:
     model = judge.problem.scene.model
     count = int(np.clip(length(model, path) / local.spacing, 20, 1000))
     left = BUDGET.left
-    with judge.in_time(path):
+    # a motion that is not smoothed to its end lasts so much longer that there is no time to judge it
+    with judge.in_time(path, least=0.45):
         even, _ = local.settled(refined(model, path, count))
         smoothed = smooth(model, even, local)
     found = judge.judged([smoothed], local)
@@ -268,13 +269,13 @@ class _Judge:
             spent.append(_computed() - began)
         self._frame = 3.0 * min(spent)  # s: each is also swept from the one before
 
-    def in_time(self, path: list[Array], share: float = 1.0) -> AbstractContextManager[None]:
+    def in_time(self, path: list[Array], share: float = 1.0, least: float = 0.2) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
         # smooth motions take twice as long as they have to
         seconds = 0.6 + 2.0 * least_time(self.problem.scene.figure, path, self._pace)
         left, judging = BUDGET.left, self._frame * seconds / self._pace.dt
         # shortcuts through a long path make it shorter, so that they have some time in any case
-        return within_budget(share * max(left - judging, 0.2 * left, 1e-9))
+        return within_budget(share * max(left - judging, least * left, 1e-9))
 
     def judged(self, parts: Sequence[Array], local: LocalPlanner) -> Plan:
         """The motion along parts (m, nq) of a path as fast as the limits allow, each from rest to rest; its figures."""
