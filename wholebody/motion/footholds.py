@@ -24,6 +24,7 @@ TREMBLES = 0.015  # m: by which a point that rests goes to and fro, as markers d
 SMOOTH = 0.04  # s: standard deviation over which places are smoothed to tell speeds of the body from those of noise
 TELLING = 0.4  # m/s below which speeds tell the noise
 QUIET, NOISE = 0.1, 0.5  # m/s of noise that changes no limit; share of what is above by which a rest may be faster
+LOADED, NARROW = 0.2, 0.15  # share of the way between feet that moves the body's mass; m: of feet that stand together
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -86,8 +87,18 @@ class Point(NamedTuple):
     kind: int
 
 
-def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point], allowed: Mask | None = None) -> Mask:
-    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; only where that is `allowed` (n, p)."""
+def resting(
+    places: Array,
+    dt: float,
+    limits: RestLimits,
+    points: Sequence[Point],
+    allowed: Mask | None = None,
+    centre: Array | None = None,
+) -> Mask:
+    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; only where that is `allowed` (n, p).
+
+    `centre` (n, 2) is about where the body's mass is: what is beside a foot that bears all of it hangs.
+    """
     found = np.zeros(places.shape[:2], dtype=bool)
     may = np.ones_like(found) if allowed is None else allowed
     rests = [slow(places[:, k], dt, limits) & may[:, k] for k in range(places.shape[1])]
@@ -115,6 +126,9 @@ def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point
             hangs = bool((_of_one_foot(points, stands, number) & ~accepted & (away > limits.height)).any())
             hangs = hangs or (base[number] > floor + STEP and (run.end - run.first) * dt < WAITED)  # or at its turn
             stays = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
+            lower = [j for j in np.flatnonzero(accepted).tolist() if points[stands[j][0]].foot != points[k].foot]
+            lower = [j for j in lower if base[j] < base[number] - limits.height]
+            hangs = hangs or (centre is not None and _unloaded(places, centre, stands, number, lower))
             stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
         seen.add(number)
         if stays:
@@ -188,6 +202,21 @@ def _came_down(heights: Array, run: Window, low: float, dt: float) -> bool:
     return bool(len(before) + len(after)) and all(
         not len(part) or float(part.max()) > low + CAME_DOWN for part in (before, after)
     )
+
+
+def _unloaded(
+    places: Array, centre: Array, stands: Sequence[tuple[int, Window, float]], number: int, lower: Sequence[int]
+) -> bool:
+    """Whether stands of the other foot bear the body (n, 2) at all times of a stand: it does not come nearer to that."""
+    k, run, _ = stands[number]
+    loads = np.ones(run.end - run.first)  # share of the way from the other foot on which the body is
+    for other, beside, _ in (stands[j] for j in lower):
+        common = slice(max(run.first, beside.first), max(run.first, beside.first, min(run.end, beside.end)))
+        way = places[common, k, :2] - places[common, other, :2]
+        along = np.einsum("ni,ni->n", way, centre[common] - places[common, other, :2])
+        here = slice(common.start - run.first, common.stop - run.first)
+        loads[here] = np.minimum(loads[here], along / np.maximum(np.einsum("ni,ni->n", way, way), NARROW**2))
+    return bool((loads < LOADED).all())
 
 
 def _bears(run: Window, dt: float, found: Mask, marks: Mask) -> bool:
