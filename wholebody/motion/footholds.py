@@ -109,7 +109,7 @@ def resting(
     middles = np.array([places[run.first : run.end, k, :2].mean(axis=0) for k, run, _ in stands]).reshape(-1, 2)
     lows = np.array([low for *_, low in stands])
     rise = above_ground([points[k] for k, *_ in stands], [run for _, run, _ in stands], lows)
-    base = lows - [rise[points[k].kind] for k, *_ in stands]
+    base = np.asarray(lows - [rise[points[k].kind] for k, *_ in stands])
     accepted, seen = np.zeros(len(stands), dtype=bool), set[int]()
     beside = np.linalg.norm(middles[:, None] - middles, axis=2) < NEARBY
     order = np.argsort(base, kind="stable").tolist()
@@ -126,8 +126,9 @@ def resting(
             hangs = bool((_of_one_foot(points, stands, number) & ~accepted & (away > limits.height)).any())
             hangs = hangs or (base[number] > floor + STEP and (run.end - run.first) * dt < WAITED)  # or at its turn
             stays = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
-            lower = [j for j in np.flatnonzero(accepted).tolist() if points[stands[j][0]].foot != points[k].foot]
-            lower = [j for j in lower if base[j] < base[number] - limits.height]
+            other = [each for each, point in enumerate(points) if point.kind == points[k].kind and each != k]
+            lower = np.flatnonzero(accepted & (base < base[number] - limits.height)).tolist()
+            lower = [j for j in lower if stands[j][0] in other]
             hangs = hangs or (centre is not None and _unloaded(places, centre, stands, number, lower))
             stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
         seen.add(number)
@@ -207,7 +208,7 @@ def _came_down(heights: Array, run: Window, low: float, dt: float) -> bool:
 def _unloaded(
     places: Array, centre: Array, stands: Sequence[tuple[int, Window, float]], number: int, lower: Sequence[int]
 ) -> bool:
-    """Whether stands of the other foot bear the body (n, 2) at all times of a stand: it does not come nearer to that."""
+    """Whether stands of the other foot bear a body with its mass at (n, 2) all the time of a stand."""
     k, run, _ = stands[number]
     loads = np.ones(run.end - run.first)  # share of the way from the other foot on which the body is
     for other, beside, _ in (stands[j] for j in lower):

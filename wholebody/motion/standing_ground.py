@@ -216,7 +216,8 @@ def ground_on(
     # what kneels or lies with its feet up does not stand on them: they are above their knees
     knees = [joints.get(f"{role.split('_')[0]}_knee", joints[role]) for role in feet]
     allowed = places[:, :, 2] <= motion.positions[:, knees, 2]
-    trunk = [joints[f"{side}_{part}"] for side in ("left", "right") for part in ("hip", "shoulder") if f"{side}_{part}" in joints]
+    ends = [f"{side}_{part}" for side in ("left", "right") for part in ("hip", "shoulder")]
+    trunk = [joints[role] for role in ends if role in joints]
     centre = motion.positions[:, trunk, :2].mean(axis=1) if len(trunk) == 4 else None
     marks = resting(places, motion.dt, limits, list(points.values()), allowed, centre)
     rests = {role: marks[:, k] for k, role in enumerate(feet)}
