@@ -141,13 +141,6 @@ class Fitter:
         self._state.update(q)
         return self._places()[: len(self.layout.points)]
 
-    def jerk(self, postures: Sequence[Array] | Array, dt: float) -> float:
-        """Root mean square of the jerk of the points over postures (nq,), `dt` seconds apart, m/s³."""
-        if len(postures) < 4:
-            return 0.0
-        steps = np.diff(np.array([self.places(q) for q in postures]), 3, axis=0)
-        return float(((steps**2).sum(axis=2).mean()) ** 0.5 / dt**3)
-
     def outside(self, q: Array) -> bool:
         """Whether a posture (nq,) has a limb outside of its reach cone."""
         self._state.update(q)
@@ -162,10 +155,6 @@ class Fitter:
         near, owners = self._workspace.near(q, 0.0), self._workspace.owners
         first, second = near.pair[near.distance.argmin()]
         return owners[first], owners[second]
-
-    def deepest_thing(self, q: Array) -> bool:
-        """Whether a thing, the ground too, is in the pair that overlaps most at a posture (nq,)."""
-        return not set(self.deepest(q)) <= set(self.figure.segments)
 
     def cost(self, q: Array, goals: Goals) -> float:
         """Half the sum of the squared weighted errors."""

@@ -19,7 +19,7 @@ last sweeps have contact rows there too, and so have sweeps after them of the fr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -52,7 +52,6 @@ GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a 
 EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 LATE = 1.3  # omega of sweeps that look at motions between frames: earlier ones are far from where these will be
-DEEP, RISES = 1.2e-3, 0.1  # m: overlap with the ground on which soles rise; of their weight left: less, feet move
 MENDED = 8, 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
@@ -92,7 +91,6 @@ class Run:
         self.slow: Indices = np.array([one.idx_q for one in joints], dtype=np.intp)
         self.slow_most = np.array([SPARE * self.most[one.idx_v] for one in joints])
         self.none = (np.zeros((len(self.fitter.layout.held), 3)),) * 2
-        self.rises = np.array([(1.0, 1.0, RISES if point.foot else 1.0) for point in self.fitter.layout.held])
         self.every, self.slowing = (max(1, round(time / dt)) for time in (EVERY, SLOWING))
         # frames between those of the first pass and first sweeps
         self.span = 2 ** int(max(0.0, np.log2((SPAN if holds else dt) / dt)))
@@ -104,7 +102,7 @@ class Run:
         self._slow, self._even, self._free, self._paths = (dict[int, Array]() for _ in range(4))
         self._first, self._found, self._deviation = (dict[int, Array]() for _ in range(3))
         self._held = dict[int, tuple[int, tuple[Array, Array]]]()
-        self._dips = dict[int, dict[float, bool]]()  # shares of the motion to a frame that overlap, and whether deep
+        self._dips = dict[int, list[float]]()  # shares of the motion to a frame at which something overlaps
         self._backward = dict[int, tuple[Array, float]]()
         self._came, self.ended = 0, False
         self._front, self._latest = np.zeros(0), (np.zeros(self.model.nv), np.zeros(self.model.nv))
@@ -191,6 +189,13 @@ class Run:
             for frame in range(given - KEPT, come - KEPT):
                 values.pop(frame, None)
         return found
+
+    def jerk(self, postures: Sequence[Array] | Array) -> float:
+        """Root mean square of the jerk of the points over postures (nq,), m/s³."""
+        if len(postures) < 4:
+            return 0.0
+        steps = np.diff(np.array([self.fitter.places(q) for q in postures]), 3, axis=0)
+        return float(((steps**2).sum(axis=2).mean()) ** 0.5 / self.dt**3)
 
     def _goals(self, frame: int, posture: Array, weights: Array, held: tuple[Array, Array] | None = None) -> Goals:
         wanted = self._wanted[frame]
@@ -347,8 +352,6 @@ class Run:
         before, after = self._found[k - span] if k else None, None if start is None else self._found.get(k + 1)
         q = self.fitter.reached(before, reference if start is None else start, span * self.most)
         midway = self._midway(k) if span == 1 and omega < LATE else []
-        if midway and any(deep for j in (k, k + 1) for deep in self._dips.get(j, {}).values()):
-            goals = with_values(goals, held_weights=self.rises * goals.held_weights)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > CLEARANCE):
                 break
@@ -364,19 +367,16 @@ class Run:
         assert self.holds is not None
         if not k or self.holds.moved(k) or (parts > MENDED[0] and not any(map(self._dips.get, (k - 1, k, k + 1)))):
             return
-        known, ends = self._dips.setdefault(k, {}), (self._found[k - 1], self._found[k])
+        known, ends = self._dips.setdefault(k, []), (self._found[k - 1], self._found[k])
         for share in (number / parts for number in range(1, parts)):
-            between = pin.interpolate(self.model, *ends, share)
-            depth = self.fitter.depth(between)
+            depth = self.fitter.depth(pin.interpolate(self.model, *ends, share))
             # an end that overlaps is to be mended first: rows of its way would be many, and cost most of the time
-            if share in known or (depth > DIP and max(map(self.fitter.depth, ends)) < CLEARANCE):
-                # sweeps that follow the first looks bring most out; soles do not rise for legs that press on each other
-                told = parts >= MENDED[0] and depth > DEEP and self.fitter.deepest_thing(between)
-                known[share] = known.get(share, False) or told
+            if share not in known and depth > DIP and max(map(self.fitter.depth, ends)) < CLEARANCE:
+                known.append(share)
 
     def _mended(self, k: int) -> None:
-        """Solve a frame again whose motion to one beside it overlaps, or one beside such a frame, which follows it."""
-        if any(map(self._dips.get, range(k - 1, k + 3))):
+        """Solve a frame again whose motion to one beside it overlaps, or one before such a frame, which leads to it."""
+        if any(map(self._dips.get, range(k, k + 3))):
             self._swept(k, 1.0, 1, self._found[k])
 
     def _midway(self, k: int) -> list[Midway]:

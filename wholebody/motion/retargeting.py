@@ -168,8 +168,8 @@ def retarget(
                 # places on things are sought as bodies come to them; a hand on the own body after a first pass
                 q = _held(run, holds, frames, all(one.base for one in contacts), progress)
                 depths = _depths(alone.fitter, holds, q)
-                most = max(JERKS * alone.fitter.jerk(alone.free, motion.dt), LEAST_JERK)
-                over = max(1.0, alone.fitter.jerk(q, motion.dt) / most, depths.max() / DEEP)
+                most = max(JERKS * alone.jerk(alone.free), LEAST_JERK)
+                over = max(1.0, alone.jerk(q) / most, depths.max() / DEEP)
                 bones = list(errors_of(motion, Clip(figure, q, motion.dt), roles, found).values())
                 tries.append((over * float(np.median(bones)) if bones else over, q, depths, holds))
                 if over < STUCK:
