@@ -341,3 +341,20 @@ def test_a_small_robot_follows_as_a_large_one(tmp_path: Path) -> None:
     clip = wb.retarget(motion, robot(tmp_path, links), ground=None)
     errors = wb.motion.bone_errors(motion, clip)
     assert max(np.degrees(np.median(values)) for values in errors.values()) < 0.1
+
+
+@pytest.mark.parametrize("clip", ["cmu_02_01.bvh", "cmu_35_01.bvh"])
+def test_the_wrist_of_the_archive_is_where_hands_bend(clip: str, human: wb.Figure, shared_data: Path) -> None:
+    """Its lwrist turns along the forearm alone; as a wrist, its hand turned one way and its bone went another."""
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / clip)
+    joints = skeleton_roles(motion)
+    elbow, wrist, hand = (
+        motion.positions[:, motion.names.index(joints[f"left_{part}"])] for part in LEGS[4:] + ("hand",)
+    )
+    twist = motion.positions[:, motion.names.index("lwrist")]
+    assert np.abs(np.cross(twist - elbow, wrist - twist)).max() < 1e-6
+    bends = np.cross(wrist - elbow, hand - wrist) / np.linalg.norm(wrist - elbow, axis=1)[:, None]
+    assert np.linalg.norm(bends, axis=1).min() > 0.3 * np.linalg.norm(hand - wrist, axis=1).min()
+    errors = wb.motion.bone_errors(motion, wb.retarget(motion, human, ground=None))
+    for side in ("left", "right"):
+        assert np.degrees(np.median(errors[f"{side}_wrist to {side}_hand"])) < 5.0

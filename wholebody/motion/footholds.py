@@ -24,6 +24,7 @@ TREMBLES = 0.015  # m: by which a point that rests goes to and fro, as markers d
 SMOOTH = 0.04  # s: standard deviation over which places are smoothed to tell speeds of the body from those of noise
 TELLING = 0.4  # m/s below which speeds tell the noise
 QUIET, NOISE = 0.1, 0.5  # m/s of noise that changes no limit; share of what is above by which a rest may be faster
+LOADED, NARROW = 0.2, 0.15  # share of the way between feet that moves the body's mass; m: of feet that stand together
 WAITED = 0.25  # s: a body that nothing lower bears for longer is borne by what rests higher
 
 
@@ -86,8 +87,18 @@ class Point(NamedTuple):
     kind: int
 
 
-def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point], allowed: Mask | None = None) -> Mask:
-    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; only where that is `allowed` (n, p)."""
+def resting(
+    places: Array,
+    dt: float,
+    limits: RestLimits,
+    points: Sequence[Point],
+    allowed: Mask | None = None,
+    centre: Array | None = None,
+) -> Mask:
+    """(n, p) when points (n, p, 3) rest, `dt` seconds apart; only where that is `allowed` (n, p).
+
+    `centre` (n, 2) is about where the body's mass is: what is beside a foot that bears all of it hangs.
+    """
     found = np.zeros(places.shape[:2], dtype=bool)
     may = np.ones_like(found) if allowed is None else allowed
     rests = [slow(places[:, k], dt, limits) & may[:, k] for k in range(places.shape[1])]
@@ -98,7 +109,7 @@ def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point
     middles = np.array([places[run.first : run.end, k, :2].mean(axis=0) for k, run, _ in stands]).reshape(-1, 2)
     lows = np.array([low for *_, low in stands])
     rise = above_ground([points[k] for k, *_ in stands], [run for _, run, _ in stands], lows)
-    base = lows - [rise[points[k].kind] for k, *_ in stands]
+    base = np.asarray(lows - [rise[points[k].kind] for k, *_ in stands])
     accepted, seen = np.zeros(len(stands), dtype=bool), set[int]()
     beside = np.linalg.norm(middles[:, None] - middles, axis=2) < NEARBY
     order = np.argsort(base, kind="stable").tolist()
@@ -115,6 +126,10 @@ def resting(places: Array, dt: float, limits: RestLimits, points: Sequence[Point
             hangs = bool((_of_one_foot(points, stands, number) & ~accepted & (away > limits.height)).any())
             hangs = hangs or (base[number] > floor + STEP and (run.end - run.first) * dt < WAITED)  # or at its turn
             stays = not (near.any() or accepted.any()) or base[number] <= floor + limits.height
+            other = [each for each, point in enumerate(points) if point.kind == points[k].kind and each != k]
+            lower = np.flatnonzero(accepted & (base < base[number] - limits.height)).tolist()
+            lower = [j for j in lower if stands[j][0] in other]
+            hangs = hangs or (centre is not None and _unloaded(places, centre, stands, number, lower))
             stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
         seen.add(number)
         if stays:
@@ -188,6 +203,21 @@ def _came_down(heights: Array, run: Window, low: float, dt: float) -> bool:
     return bool(len(before) + len(after)) and all(
         not len(part) or float(part.max()) > low + CAME_DOWN for part in (before, after)
     )
+
+
+def _unloaded(
+    places: Array, centre: Array, stands: Sequence[tuple[int, Window, float]], number: int, lower: Sequence[int]
+) -> bool:
+    """Whether stands of the other foot bear a body with its mass at (n, 2) all the time of a stand."""
+    k, run, _ = stands[number]
+    loads = np.ones(run.end - run.first)  # share of the way from the other foot on which the body is
+    for other, beside, _ in (stands[j] for j in lower):
+        common = slice(max(run.first, beside.first), max(run.first, beside.first, min(run.end, beside.end)))
+        way = places[common, k, :2] - places[common, other, :2]
+        along = np.einsum("ni,ni->n", way, centre[common] - places[common, other, :2])
+        here = slice(common.start - run.first, common.stop - run.first)
+        loads[here] = np.minimum(loads[here], along / np.maximum(np.einsum("ni,ni->n", way, way), NARROW**2))
+    return bool((loads < LOADED).all())
 
 
 def _bears(run: Window, dt: float, found: Mask, marks: Mask) -> bool:

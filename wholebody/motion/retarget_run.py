@@ -52,7 +52,7 @@ GOES_ON, RETURN = 0.32, 0.3  # s in which a change of the deviation ends, and a 
 EVEN, KEEP = 0.06, 0.1  # s over which what bones do not determine is smoothed; weight of it, in metres that limbs move
 CALM, SPREAD = 0.025, 0.06  # s over which the free fit and the deviation of the first pass are smoothed
 LATE = 1.3  # omega of sweeps that look at motions between frames: earlier ones are far from where these will be
-MENDED = 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
+MENDED = 8, 8, 16  # parts of a motion between frames that are looked at before each mend after the sweeps
 KEPT = 30  # frames before the last one that stay known, for what looks back
 SPARE = 0.9  # share of the speed limits that the free fit takes, so that there is some for what deviates from it
 
@@ -375,8 +375,8 @@ class Run:
                 known.append(share)
 
     def _mended(self, k: int) -> None:
-        """Solve a frame again whose motion to one beside it overlaps."""
-        if self._dips.get(k) or self._dips.get(k + 1):
+        """Solve a frame again whose motion to one beside it overlaps, or one before such a frame, which leads to it."""
+        if any(map(self._dips.get, range(k, k + 3))):
             self._swept(k, 1.0, 1, self._found[k])
 
     def _midway(self, k: int) -> list[Midway]:

@@ -215,7 +215,11 @@ def ground_on(
     places = motion.positions[:, [joints[role] for role in feet]]
     # what kneels or lies with its feet up does not stand on them: they are above their knees
     knees = [joints.get(f"{role.split('_')[0]}_knee", joints[role]) for role in feet]
-    marks = resting(places, motion.dt, limits, list(points.values()), places[:, :, 2] <= motion.positions[:, knees, 2])
+    allowed = places[:, :, 2] <= motion.positions[:, knees, 2]
+    ends = [f"{side}_{part}" for side in ("left", "right") for part in ("hip", "shoulder")]
+    trunk = [joints[role] for role in ends if role in joints]
+    centre = motion.positions[:, trunk, :2].mean(axis=1) if len(trunk) == 4 else None
+    marks = resting(places, motion.dt, limits, list(points.values()), allowed, centre)
     rests = {role: marks[:, k] for k, role in enumerate(feet)}
     raw = [
         Foothold(role, *run, motion.positions[run.first : run.end, joints[role]].mean(axis=0), 0.0)
