@@ -235,6 +235,7 @@ def test_goals_are_at_their_targets_with_what_is_left_and_ghosts_are_transparent
         Orientation("head2_joint", pin.Quaternion(head.rotation).coeffs()),
         Axis("head2_joint", (1, 0, 0), toward=(2.0, 1.0, 0.0)),
         CenterOfMass((0.1, 0.0, 0.0), axes="xy"),
+        Axis("head2_joint", (1, 0, 0), direction=(0.0, 0.0, 3.0)),
     )
     with Viewer(exhibit) as viewer:
         viewer.show(q, problem=problem)
@@ -253,6 +254,8 @@ def test_goals_are_at_their_targets_with_what_is_left_and_ghosts_are_transparent
         wanted = nodes(["/goals/3/wanted"])[0]["matrix"][:3, 2]
         np.testing.assert_allclose(np.cross(wanted, (2.0, 1.0, 0.0) - head.translation), 0.0, atol=1e-5)
         np.testing.assert_allclose(nodes(["/goals/4/target"])[0]["matrix"][:3, 3], [0.1, 0.0, 0.0], atol=1e-5)
+        tip = head.translation + (0.0, 0.0, 2.5 * LOOK.axes_length)  # of the arrow: the head itself is not hidden
+        np.testing.assert_allclose(nodes(["/goals/5/text"])[0]["matrix"][:3, 3], tip, atol=1e-5)
         viewer.show(q)
         viewer.ghosts([exhibit.posture(4), ghost := exhibit.posture(5)])
         assert viewer.sync(10.0)

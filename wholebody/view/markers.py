@@ -62,7 +62,10 @@ class Goals:
             self._point(keyframe, root, goal, here)
             text = f"{getattr(goal, 'frame', 'centre of mass')}  {left(goal, state)}"
             label = Marker("label", LOOK.goal_label, LOOK.label_size, text)
-            keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(target.translation))
+            at = target.translation
+            if getattr(goal, "toward", at) is None:  # beside the tip of the arrow, as a label hides what it is at
+                at = at + _arrow() * _wanted(goal, here) / np.linalg.norm(_wanted(goal, here))
+            keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(at))
 
     def targets(self, state: State) -> Array:
         """Positions (n, 3) that should be in the picture; with those between it and a distant gaze target."""
@@ -94,8 +97,13 @@ class Goals:
         wanted = _wanted(goal, here)
         blue, green = LOOK.axes[2], LOOK.target
         for name, color, way in (("is", blue, now), ("wanted", green, wanted)):
-            place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), 2.5 * LOOK.axes_length)
+            place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), _arrow())
             keyframe.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35, symbol=True), place)
+
+
+def _arrow() -> float:
+    """Length of an arrow along an axis, metres."""
+    return float(2.5 * LOOK.axes_length)
 
 
 def _wanted(goal: Any, here: pin.SE3) -> Array:

@@ -185,7 +185,7 @@ class SearchNumbers(NamedTuple):
     width: float = 0.5  # of the funnel of descents that seek lower minima. Narrower: shorter steps, slower.
     less: float = 0.98  # share of the least measures that others must come below. More: descents in vain end later.
     # the same where terms are contacts, whose descents take ten times as long. More: only the best is begun from.
-    less_of_contacts: float = 0.9
+    less_of_contacts: float = 0.8
 
 
 class StepNumbers(NamedTuple):
