@@ -300,9 +300,10 @@ class QPMultistart(Search):
 
     def _below_things(self, others: Iterable[Array]) -> float:
         """Seek a lower minimum beside one through things, from the best or others; their least measures, else 0."""
-        less = SEARCH.less_of_contacts if self._touches else SEARCH.less
-        least = np.inf
+        less, least, before = SEARCH.less_of_contacts if self._touches else SEARCH.less, np.inf, self.best.measure
         for number, q in enumerate(chain([self.best.q], others)):
+            if self.best.measure < before or least < before * np.exp(-1.0 / SEARCH.dear):
+                break  # lower, or others follow at random
             local = self._through(q, less, feasible=number > 0)
             if local.measure < less * min(self.best.measure, least) and not self.control.over:
                 self._lower(local.q)
@@ -393,8 +394,7 @@ class QPMultistart(Search):
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one."""
-        nearest = self._ran(self._closest(), self.best.q)
-        self.accept(nearest)
+        self.accept(nearest := self._ran(self._closest(), self.best.q))
         if not nearest.converged:
             self.accept(nearest := self._descend(self.best.q, note="nearest", measures=False))
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
