@@ -47,7 +47,8 @@ class QPMultistart(Search):
         super().__init__(problem, workspace, solver, settings, control)
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
-        self._in_contact: list[float] = []  # violations where descents from before contact ended
+        self._in_contact, self._seats = list[float](), list[Array]()  # violations from before contact; (nq,) nearer
+        self._touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))  # contacts
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self._doubtful = self.out_of_reach = False  # whether the start may lead lower than a squat; as it seems
 
@@ -81,14 +82,17 @@ class QPMultistart(Search):
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
-        rests = least_effort(self.problem, self.lineariser.state)
+        rests, now = least_effort(self.problem, self.lineariser.state), False
         # Who stands begins on the seat, with the hands below a desk or above; who sits, only if it is much nearer.
         seats = ((0.0, "sitting"), *[(0.0, "arms_forward")] * bool(rests), (1.0, "sitting"))
         for given in () if begin else seats:
             on, share = self._nearer(seated(self.problem, self.lineariser.state, self._start, *given))
-            yield Attempt(on if rests or share < MUCH else (), self.directly, "from the seat")
+            self._seats += on if share < SEARCH.nearer else []
+            now = now or bool(rests) or share < MUCH
+            yield Attempt(on if now else (), self.directly, "from the seat")
         yield Attempt(() if begin else self._low(), self.directly, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
+        yield Attempt(() if now else self._seats[:1], self.directly, "from the seat")
         yield Attempt(rests, self.directly, "from the posture of least effort")
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         if (least := least_left(self.contradictions)) is None:
@@ -138,18 +142,19 @@ class QPMultistart(Search):
         """Those from other starts, of which there are `count`."""
         if few := self._few():
             self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
-        starts = self._seeded(count)
-        aimed = self.problem.goals and not (few or self._least or self.out_of_reach)
+        starts = self._seeded(count, self._seats[0] if self._seats else self._start)
+        aimed = self.problem.goals and not (few or self._least or self.out_of_reach or self._seats)
         beside = self._beside(min(count, SEARCH.beside) if aimed else 0)
         for _ in range(count):  # in turn: one from beside takes the programs of two others
             yield Attempt(islice(beside, 1), self._free, "from beside the goals")
-            yield Attempt(islice(starts, 2), self._relaxed, "from another start")
+            # descents by whole steps sit and grip, which probes hardly ever do
+            yield Attempt(islice(starts, 2), self.directly if self._seats else self._relaxed, "from another start")
 
     def _without_measures(self, start: Array) -> LocalSolution | None:
         """Seek a feasible posture so that no measure changes what is reached, and descend; None: nothing but start."""
         settings = replace(self.settings, measures=False)
         found = QPMultistart(self.problem, self.lineariser.workspace, self.solver, settings, self.control)
-        found.contradictions, found._least = self.contradictions, self._least
+        found.contradictions, found._least, found._seats = self.contradictions, self._least, self._seats
         found._best = begin = found._ran(found._feasibility(found.lineariser, 0, ""), start)
         found.search(found._attempts_for_feasibility())
         self.count(found)
@@ -244,11 +249,6 @@ class QPMultistart(Search):
             before = self.best.measure
             gains = self.accept(self._descend(self.best.q)) and self.best.measure < SEARCH.moved * before
 
-    @property
-    def _touches(self) -> bool:
-        """Whether a term is a contact."""
-        return any(hasattr(term, "touches") for term in (*self.problem.goals, *self.problem.constraints))
-
     def _descend_again(self) -> bool:
         """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
         # At a kink two points touch at once; the point that counts as the contact should leave.
@@ -296,14 +296,15 @@ class QPMultistart(Search):
 
     def _below_things(self, others: Iterable[Array]) -> float:
         """Seek a lower minimum beside one through things, from the best or others; their least measures, else 0."""
-        less = SEARCH.less_of_contacts if self._touches else SEARCH.less
-        through, best = self._through(self.best.q, less), self.best.measure
-        for q in () if through.measure < less * best else others:
-            local = self._through(q, less, feasible=True)
-            through = local if local.measure < through.measure else through
-        if through.measure < less * best and not self.control.over:
-            self._lower(through.q)
-        return through.measure if np.isfinite(through.measure) else 0.0
+        less, least, before = SEARCH.less_of_contacts if self._touches else SEARCH.less, np.inf, self.best.measure
+        for number, q in enumerate(chain([self.best.q], others)):
+            if self.best.measure < before or least < before * np.exp(-1.0 / SEARCH.dear):
+                break  # lower, or others follow at random
+            local = self._through(q, less, feasible=number > 0)
+            if local.measure < less * min(self.best.measure, least) and not self.control.over:
+                self._lower(local.q)
+            least = min(least, local.measure)
+        return least if np.isfinite(least) else 0.0
 
     def _through(self, start: Array, less: float, feasible: bool = False) -> LocalSolution:
         """A descent through things, as long as it may come below a share of the least measures; else these are inf.
@@ -375,7 +376,7 @@ class QPMultistart(Search):
         if not (self.problem.goals and self.problem.scene.model.nv):
             return False
         agreeing = SEARCH.agreeing_few if (few := self._few()) else SEARCH.agreeing
-        starts = chain([q], self._seeded((SEARCH.reach_trials_few if few else SEARCH.reach_trials) - 1))
+        starts = chain([q], self._seeded((SEARCH.reach_trials_few if few else SEARCH.reach_trials) - 1, self._start))
         enough, programs = SEARCH.reached * self.settings.tolerance, self._at_most(SEARCH.reach_trial_programs)
         alone = with_values(self._shared, lineariser=self.lineariser.relaxed(ENDLESS))
         reach = Closest(alone, enough, programs, problem=self.problem, contacts=False)
@@ -386,8 +387,7 @@ class QPMultistart(Search):
 
     def _closest_from_best(self) -> None:
         """Find the closest posture from the best one."""
-        nearest = self._ran(self._closest(), self.best.q)
-        self.accept(nearest)
+        self.accept(nearest := self._ran(self._closest(), self.best.q))
         if not nearest.converged:
             self.accept(nearest := self._descend(self.best.q, note="nearest", measures=False))
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)

@@ -123,11 +123,11 @@ class Search(Multistart[LocalSolution]):
         """Whether few degrees of freedom move the goals."""
         return moving(self._shared, self.best.q) < SEARCH.few
 
-    def _seeded(self, count: int) -> Iterator[Array]:
-        """So many postures at random, (nq,): throughout the limits where few degrees of freedom move the goals."""
+    def _seeded(self, count: int, around: Array) -> Iterator[Array]:
+        """So many random postures around one, (nq,), or throughout the limits where few degrees of freedom move the goals."""
         rng = np.random.default_rng(self.settings.seed)
         draw = throughout if self._few() else restarts
-        return self.lineariser.defined(draw(self.problem, self.lineariser.state, self._start, rng, count))
+        return self.lineariser.defined(draw(self.problem, self.lineariser.state, around, rng, count))
 
     def _pass_things(self, count: int) -> None:
         """Find the closest posture from where descents through things rest, and `count` others, until three end alike.
@@ -137,7 +137,9 @@ class Search(Multistart[LocalSolution]):
         if (near := self._near) is None:
             return
         ends = list[LocalSolution]()
-        for q in chain.from_iterable(zip_longest((near.q, *self._resting), self._seeded(count) if count else ())):
+        for q in chain.from_iterable(
+            zip_longest((near.q, *self._resting), self._seeded(count, self._start) if count else ())
+        ):
             missed = self.best.violation
             met = missed.worst <= self.settings.tolerance or missed.total <= SEARCH.agree * near.violation.total
             if met or alike([end.violation.total for end in ends]):

@@ -177,6 +177,8 @@ class SearchNumbers(NamedTuple):
     optimal: float = 1e-2  # rad: first-order optimality of a contact's answer from which on it counts as none
     lower: float = 0.9995  # share of a contact's measures below which those at its place are another minimum
     moved: float = 0.99  # share below which they are looked for again, at the place of that minimum. More: slower.
+    # share of what the start misses below which who sits is tried on the seat too. More: in vain of those beside it.
+    nearer: float = 0.9
     poor: int = 2  # starts for the measures where it is none after all. More: lower, slower.
     screened: int = 4  # feasible postures that are looked for, for each descended from. More: lower measures, slower.
     # starts that seek lower minima, for each factor e that things multiply the measures by. More: lower, slower.

@@ -1,0 +1,21 @@
+"""Lower minima: where a descent from the start ends in a poor one, a search finds what random starts find."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.methods.starts import restarts
+
+
+@pytest.mark.parametrize(("name", "number"), [("uniform_witnesses", 4), ("self_contact", 3), ("self_contact", 33)])
+def test_a_poor_minimum_beside_another_through_things_is_left(name: str, number: int) -> None:
+    """Random starts were not tried where something a little lower through things led nowhere: 2 to 4 times as high."""
+    problem = problem_set(name).make(number, 5005).problem
+    with problem.borrow() as workspace:
+        given = problem, workspace.state, problem.scene.figure.clamp(problem.start)
+        starts = [q.copy() for q in restarts(*given, np.random.default_rng(7), 30)]
+    ends = [end.assessment.measure for end in wb.methods.QP().minima(problem, starts) if end.status == "solved"]
+    assert wb.solve(problem).assessment.measure < 1.05 * min(ends)
