@@ -48,11 +48,11 @@ gc.disable()  # until all is collected: looking through what is imported takes a
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# A failure says how to repeat it. In CI, where CI is set, the examples are the same in every run.
+# Examples are the same in every run; `--hypothesis-profile random` tries others. A failure says how to repeat it.
 settings.register_profile(
-    "default", max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
+    "random", max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
-settings.register_profile("ci", settings.get_profile("default"), derandomize=True, database=None)
+settings.register_profile("repeated", settings.get_profile("random"), derandomize=True, database=None)
 # Tests that press Ctrl-C do so as in a terminal; what runs in the background is started with it ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # Pieces of meshes are made anew in every run of the tests, by the code under test; workers of one run share them.
@@ -64,7 +64,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # The tests' own byte code is kept too: to rewrite their assertions is most of what collecting them takes.
 sys.dont_write_bytecode = False
 
-settings.load_profile("ci" if os.environ.get("CI") else "default")
+settings.load_profile("repeated")
 
 COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1e-5)}
 """Accuracy of coal's distances: metres, and share of the size of both pieces together.

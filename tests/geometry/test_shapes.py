@@ -110,7 +110,9 @@ def test_ellipsoid_and_sphere(coal_slack: Slack, axes: tuple[float, float, float
 @given(seed, st.integers(4, 60))
 def test_hull_keeps_what_was_given(number: int, count: int) -> None:
     rng = np.random.default_rng(number)
-    points = rng.normal(size=(count, 3)) * 0.3 + rng.normal(size=3) * 5.0
+    points = rng.normal(size=(count, 3)) * 0.3
+    assume(np.linalg.svd(points - points.mean(axis=0))[1].min() > 1e-3)  # thinner ones are refused
+    points += rng.normal(size=3) * 5.0
     (piece,) = Hull(np.vstack([points, points])).pieces()
     kept = np.asarray(piece.geometry.points()) + piece.placement.translation
     reference = ConvexHull(points)
