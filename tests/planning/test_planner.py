@@ -876,6 +876,42 @@ def test_contact_terms_as_arrays_hold_where_the_terms_do_and_have_the_derivative
             assert (wrong < 1e-4).sum() >= len(values) - 4
 
 
+def tray(folder: Path) -> wb.Figure:
+    """An arm, and a tray that is only drawn."""
+    link = """<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+        </inertial><{1}><origin xyz="0 0 {2}" rpy="0 {3} 0"/><geometry><box size="0.1 0.1 0.02"/></geometry></{1}>
+        </link>"""
+    joint = """<joint name="j{0}" type="revolute"><parent link="base"/><child link="{0}"/><origin xyz="{1} 0 0.3"/>
+        <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>"""
+    parts = [link.format("base", "collision", -0.3, 0), link.format("arm", "collision", 0.2, 0)]
+    parts += [link.format("tray", "visual", 0, 0.3), joint.format("arm", 0), joint.format("tray", 0.5)]
+    (folder / "tray.urdf").write_text(f'<robot name="tray">{"".join(parts)}</robot>')
+    return wb.load(folder / "tray.urdf")
+
+
+@pytest.mark.parametrize("face", ["of a point", "only drawn", "of flesh"])
+def test_contact_terms_as_arrays_hold_where_the_terms_do_at_faces_of_no_rigid_piece(face: str, tmp_path: Path) -> None:
+    """Those of fingertips were an IndexError in a plan; others were taken to be where another piece is."""
+    term: Any
+    if face == "of a point":
+        scene, start, term = wb.Scene(wb.load("human")), "standing", wb.Touch("right_index_tip", "left_index_tip")
+    elif face == "only drawn":
+        scene, start = wb.Scene(tray(tmp_path)), None
+        term = wb.tasks.Lean("tray", part="arm", side=(0.0, 0.0, 1.0))
+    else:
+        scene = wb.Scene({"one": wb.load("human"), "two": (wb.load("human"), (0.6, 0.1, 0.0))})
+        start = scene.figure.posture({"one": "sitting", "two": "standing"})
+        term = wb.Sit("two/left_thigh:3", pelvis="one/pelvis", trunk="one/thorax")
+    problem = wb.Problem(scene, start, constraints=[term])
+    (term,) = (each for each in problem.constraints if isinstance(each, TermOfParts))
+    with problem.borrow() as workspace:
+        *_, joined = joined_contacts(problem.constraints, workspace)
+        state = workspace.state.update(problem.start)
+        values = joined.value(state)
+        missed = np.maximum(joined.lower - values, values - joined.upper).clip(min=0.0)
+        assert np.sort(missed)[-2:] == pytest.approx(np.sort(np.abs(term.value(state)))[-2:], abs=1e-5)
+
+
 def test_what_a_constraint_lets_touch_needs_no_room() -> None:
     """Postures in which nothing overlaps, and only what sits or stands is nearer to anything than 2 mm, are free."""
     problem, end = seated()
