@@ -23,7 +23,7 @@ from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.bench.suite.problem_sets.robots import known_arm
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
-from wholebody.methods.control import BUDGET
+from wholebody.methods.control import BUDGET, within_budget
 from wholebody.planning import Pace, Plan
 from wholebody.planning.contact_values import ContactValues, joined_contacts
 from wholebody.planning.ends import nearer
@@ -35,6 +35,7 @@ from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, places, refined, shortcut
 from wholebody.planning.tightening import DAMPING, programmed, tighten
+from wholebody.planning.timing import Timing
 from wholebody.planning.tracked_motions import TrackedMotions
 from wholebody.tasks.contact_parts import TermOfParts
 
@@ -687,13 +688,30 @@ class Slow(wb.tasks.Bound):
         return -most, most
 
 
-@pytest.mark.parametrize(("most", "second"), [(0.01, False), (0.5, True)])
+@pytest.mark.parametrize(("most", "second"), [(0.01, False), (0.001, False), (0.5, True)])
 def test_a_bound_of_ones_own_limits_the_steps_from_frame_to_frame(most: float, second: bool) -> None:
     scene = wb.Scene(wb.load("hand"))
     found = wb.plan(scene, "open", "grip", constraints=[Slow(most, second)])
     assert found.solved, found.message
     steps = np.diff(found.clip.q, axis=0)
     assert 0.9 * most < np.abs(steps).max() / (found.clip.dt if second else 1.0) <= 1.001 * most
+
+
+def test_who_may_only_move_slowly_goes_round_a_thing(planar_arm: Any) -> None:
+    """Steps of 4 mrad counted as none that get nearer, and no motion was found."""
+    scene = wb.Scene(planar_arm([0.3, 0.3])).add(wb.Sphere(0.06), name="ball", at=(0.5, 0.0, 0.0))
+    start, end = np.array([-0.6, 0.0]), np.array([0.6, 0.0])
+    assert scene.sweep(start, end) is not None
+    found = wb.plan(scene, start, end, constraints=[Slow(4e-3, False)])
+    assert found.solved, found.message
+    assert np.abs(np.diff(found.clip.q, axis=0)).max() <= 1.001 * 4e-3
+
+
+def test_no_more_frames_are_made_than_there_is_time_to_judge(planar_arm: Any) -> None:
+    figure, path = planar_arm([0.3, 0.2]), np.linspace(np.zeros(2), np.ones(2), 20)
+    with within_budget(1.0):
+        q = Timing(figure, path, Pace(), [Slow(1e-5, False)]).within()
+    assert len(q) < 1000
 
 
 def test_what_is_frozen_stays_and_a_goal_that_moves_it_is_refused() -> None:
