@@ -875,23 +875,23 @@ def test_contact_terms_as_arrays_hold_where_the_terms_do_and_have_the_derivative
     """At postures of a person who sits at a desk, and beside these; ranges are bounds, and their rows no kinks."""
     problem, end = seated()
     rng, model = np.random.default_rng(0), problem.scene.model
-    contacts = [term for term in problem.constraints if isinstance(term, TermOfParts)]
+    # pieces of the right side come after those of the left
+    terms = *problem.constraints, wb.Touch("right_hand", "left_thigh").resolve(problem.scene, problem.start)
+    contacts = [term for term in terms if isinstance(term, TermOfParts)]
     with problem.borrow() as workspace:
-        (joined,) = (
-            each for each in joined_contacts(problem.constraints, workspace) if isinstance(each, ContactValues)
-        )
+        (joined,) = (each for each in joined_contacts(terms, workspace) if isinstance(each, ContactValues))
         state = workspace.state
         for size, here in [(0.0, problem.start), (0.0, end), *((0.02, problem.start) for _ in range(5))]:
             q = pin.integrate(model, here, size * rng.normal(size=model.nv))
             values, rows = joined.value_and_jacobian(state.update(q), joined.value)
             missed = np.sort(np.maximum(joined.lower - values, values - joined.upper).clip(min=0.0))
-            worst = max(np.abs(term.value(state)).max() for term in contacts)
-            assert missed[-1] == pytest.approx(worst, abs=2e-5, rel=0.01)
+            *others, touch = (np.abs(term.value(state)).max() for term in contacts)
+            assert missed[-2:] == pytest.approx(np.sort([max(others), touch]), abs=2e-5, rel=0.01)
             away, step = rng.normal(size=model.nv), 1e-6
             ends = [joined.value(state.update(pin.integrate(model, q, side * step * away))) for side in (1.0, -1.0)]
             wrong = np.abs((ends[0] - ends[1]) / (2.0 * step) - rows @ away)
-            # distances have kinks where corners of a sole are as deep as others, to which the rows are the slope
-            assert (wrong < 1e-4).sum() >= len(values) - 4
+            # where it rests distances have kinks, as corners of a sole are as deep as others; rows are the slope to one
+            assert (wrong < 1e-4).sum() >= len(values) - (0 if size else 4)
 
 
 def tray(folder: Path) -> wb.Figure:
