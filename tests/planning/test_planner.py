@@ -911,6 +911,7 @@ def tray(folder: Path) -> wb.Figure:
 def test_contact_terms_as_arrays_hold_where_the_terms_do_at_faces_of_no_rigid_piece(face: str, tmp_path: Path) -> None:
     """Those of fingertips were an IndexError in a plan; others were taken to be where another piece is."""
     term: Any
+    start: Any
     if face == "of a point":
         scene, start, term = wb.Scene(wb.load("human")), "standing", wb.Touch("right_index_tip", "left_index_tip")
     elif face == "only drawn":
