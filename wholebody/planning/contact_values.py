@@ -170,13 +170,16 @@ def joined_contacts(terms: Sequence[Constraint], workspace: Workspace) -> tuple[
 
 
 def _rows_of(part: Any, geometry: pin.GeometryModel) -> list[Row] | None:
-    """Rows of a part; None for one of another class, or of what is no face."""
+    """Rows of a part; None for one of another class, and where the face is not at the placement of a scene's piece."""
     if type(part) is Looking:
         ends = (-np.sin(part.most), np.sin(part.most)) if part.level else (np.cos(part.most), np.inf)
         return [_turned(part.place, part.axis, 0, part.direction, *map(float, ends))]
     if type(part) not in (Facing, Level, Over) or not isinstance(part.face, Face):
         return None
-    at = geometry.geometryObjects[part.face.surface.pieces[0]].placement
+    on = part.face.surface
+    if not on.owners or any(number == 0 for number, _ in on.flesh):  # a point, only drawn, or flesh, which spreads
+        return None
+    at = geometry.geometryObjects[on.pieces[0]].placement
     axes, joint = part.face.axes @ at.rotation.T, part.face.joint
     if isinstance(part, Over):
         place, middle = part.place.placement.act(part.offset), at.act(part.face.center)

@@ -57,7 +57,7 @@ class ProjectedMotions(Geodesics):
         self._away = np.zeros(self._model.nv)
         self._on = set[bytes]()  # postures that were seen to be on what is held
         self._last = b"", self._packed(problem.start, -1.0)  # the posture that was linearised last, and what is there
-        # of steps: contacts, which take most of the time of a posture, are equalities
+        # of steps: what has equalities alone is left out; contact terms, which are one, mostly have ranges too
         loose = [not (term.lower == term.upper).all() for term in terms]
         self._loose = ConstraintValues([term for term, asked in zip(terms, loose, strict=True) if asked], state)
         self._rows = np.repeat(loose, [np.size(each[0]) for each in sides])

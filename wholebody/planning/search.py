@@ -209,6 +209,10 @@ class Search:
         Most narrow places are around ends, and steps towards the start lead out of them.
         """
         start = self._problem.start
+        # steps that a bound of one's own limits may be thousands
+        if self._local is self._slides and (way := self._slides.geodesics.joined(start, end, np.inf)):
+            self._straight = True
+            return [start, *way]
         way, self._straight = self._local.towards(start, end)
         if self._straight:
             return [start, *way[:-1], end]

@@ -83,7 +83,7 @@ class Timing:
         """The frames of the fastest timing whose differences keep the limits, each corrected (nq,) where they do."""
         slower, exact = 1.0, corrected is None
         for _ in range(11):  # a motion whose derivatives keep the limits is slowed until its frames do
-            q = self.frames(slower)
+            left, q = BUDGET.left, self.frames(slower)
             if exact and corrected is not None:
                 for k in range(1, len(q) - 1):
                     if BUDGET.over:
@@ -92,6 +92,8 @@ class Timing:
             use = used(self._figure, q, self._pace, self._bounds)
             over = max(use.velocity, np.sqrt(use.acceleration), use.step)
             if (over <= 1.0 and exact) or not np.isfinite(over):
+                break
+            if use.step > 1.0 and 5.0 * (left - BUDGET.left) * over > BUDGET.left:  # frames of which none is judged
                 break
             exact = exact or over <= 1.0
             slower *= 1.001 * max(over, 1.0)

@@ -16,6 +16,7 @@ from wholebody.planning.projected_motions import ProjectedMotions
 from wholebody.planning.sampling import holds
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.bounds import Freeze
 from wholebody.tracking.qp_strategy import Attraction
 
 REACHED = 1e-3  # rad, m: difference from a posture that counts as reached by steps of the tracker
@@ -55,6 +56,10 @@ class TrackedMotions:
         self.partial = self.geodesics.partial
         self._problem.goals, self._problem.measures = (), (self._attraction,)
         self._problem.clearances = problem.clearances + MARGIN
+        state = workspace.state.update(problem.start)
+        own = [bound.bounds(state, 1.0) for bound in problem.bounds if not isinstance(bound, Freeze)]
+        # rad, m: a step that gets nearer by less ends a motion; smaller: longer motions along things
+        self._slow = min([5e-3, *(0.3 * float(max(np.max(high), -np.min(low))) for low, high in own)])
         self._tracker = QP(restarts=0).tracker(self._problem, 1.0)
         self._resting = self._problem.with_start(problem.start)
         self._resting.goals = self._resting.measures = ()
@@ -98,7 +103,7 @@ class TrackedMotions:
         while left > REACHED:
             here, before, q = q, rest, self._stepped(q)
             left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target, factors)
-            slow = rest > before - 5e-3 and left > REACHED  # rad, m; smaller: longer motions along things
+            slow = rest > before - self._slow and left > REACHED
             if slow or gone + left > most or BUDGET.over or not self.geodesics.keeps(q):
                 return way, False
             way.append(q)

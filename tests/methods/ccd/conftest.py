@@ -90,7 +90,7 @@ def brought_back(
             limbs.forward()
             left += out(q) > 1e-6
             worst = max(out(q), outside(human, q))
-            assert made.kept() == (worst == 0.0) or worst < 1e-9
+            assert made.kept() == (worst == 0.0) or 0.0 < worst < 1e-9
             made.keep()
             assert made.kept()
             limbs.write(q)
