@@ -273,8 +273,8 @@ class QPMultistart(Search):
         if not measures or self.best.violation.worst > tolerance:
             return
         given, found = (self.problem, self.lineariser.state, self._start), list[LocalSolution]()
-        others = restarts(*given, np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count - 1)
-        for q in chain([self._start], self.lineariser.defined(others)) if count else ():
+        seeded = restarts(*given, np.random.default_rng([self.settings.seed, count]), SEARCH.screened * count - 1)
+        for q in chain([self._start], self.lineariser.defined(seeded)) if count else ():
             local = None if self.control.over else self._through_things(q, "for measure")
             if local is not None and local.violation.worst <= tolerance:
                 found.append(local)
@@ -284,9 +284,14 @@ class QPMultistart(Search):
             return
         begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
         starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
-        # the second start is half way to the limits; to contacts from the first one nobody is bent back or astride
-        more = () if count else [self._start] if self._touches else islice(starts, 1, 2)
-        least = self._through_measure or self._below_things(more)
+        others: Iterable[Array] = ()  # a descent to a contact takes ten times as long: only from poor ones
+        if self._touches and not count and self.best.measure > SEARCH.poor_contact:
+            for q in islice(self._before_contact(begin=[*arms_ahead(*given)]), 2):
+                self.accept(self._descend(q), "from before contact")
+            others = [self._start]  # from there nobody is bent back or astride
+        elif not (self._touches or count):
+            others = islice(starts, 1, 2)  # half way to the limits
+        least = self._through_measure or self._below_things(others)
         for number, q in enumerate(chain(islice(starts, 1), [self._start], starts)):
             dear = np.log(self.best.measure / least) if 0.0 < least < self.best.measure else 0.0
             most = 0 if self._touches else int(SEARCH.dear * dear)
