@@ -167,6 +167,25 @@ def test_no_turn_of_its_piece_brings_a_point_nearer_than_its_bound(standing, off
         assert min(gaps) < 0.005
 
 
+def test_flesh_that_spreads_on_a_seat_is_in_the_thigh_of_who_stands():
+    """A wall between the thigh and where its flesh would be on a seat: held or asked to stay, she stays."""
+    figure = wb.load("human", sex="female", stature=1.6, mass=95.0)
+    scene, q = wb.Scene(figure), figure.neutral
+    (flesh,) = (piece for piece in figure.geometry.geometryObjects if piece.name == "left_thigh:3")
+    joint = scene.state(q).data.oMi[flesh.parentJoint]
+    wall = joint.act(flesh.placement.translation)[1] + flesh.geometry.radius - 0.009
+    scene.add(wb.Box((1.0, 0.5, 0.2)), name="wall", at=(0.0, wall + 0.25, 0.73))
+    thigh = figure.placement(q, "left_thigh")
+    place = joint.act(flesh.placement.translation + [0.0, flesh.geometry.radius - 0.001, 0.0])
+    asked = [wb.Frame("left_thigh", thigh), wb.Point("left_thigh", place, offset=thigh.actInv(place))]
+    for problem in (
+        wb.Problem(scene, q, constraints=[wb.Hold("left_thigh")]),
+        *(wb.Problem(scene, q, goals=[goal]) for goal in asked),
+    ):
+        assert wb.solve(problem).status == "solved"
+        assert found(problem) == ()
+
+
 def test_a_tip_may_be_asked_onto_a_face(standing):
     goal = wb.Point("right_index_tip", (0.4, -0.3, 1.0))
     assert found(standing((wb.Box((0.2, 0.2, 0.2)), (0.4, -0.3, 0.9)), goals=[goal])) == ()

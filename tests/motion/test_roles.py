@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from itertools import pairwise
 from pathlib import Path
@@ -358,3 +359,21 @@ def test_the_wrist_of_the_archive_is_where_hands_bend(clip: str, human: wb.Figur
     errors = wb.motion.bone_errors(motion, wb.retarget(motion, human, ground=None))
     for side in ("left", "right"):
         assert np.degrees(np.median(errors[f"{side}_wrist to {side}_hand"])) < 5.0
+
+
+def test_an_arm_of_the_archive_that_ends_in_its_lwrist_has_a_wrist(shared_data: Path) -> None:
+    """Files that were written without hands: the joint that alone goes on from the elbow."""
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_01.bvh")
+    hands = tuple(f"{side}{part}" for side in "lr" for part in ("hand", "fingers", "thumb"))
+    kept = [k for k, name in enumerate(motion.names) if not name.startswith(hands)]
+    cut = dataclasses.replace(
+        motion,
+        names=tuple(motion.names[k] for k in kept),
+        parents=tuple(kept.index(motion.parents[k]) if k else -1 for k in kept),
+        offsets=motion.offsets[kept],
+        positions=motion.positions[:, kept],
+        rotations=motion.rotations[:, kept],
+    )
+    found = skeleton_roles(cut)
+    assert [found.get(f"{side}_wrist") for side in ("left", "right")] == ["lwrist", "rwrist"]
+    assert "left_hand" not in found

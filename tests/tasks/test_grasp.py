@@ -243,11 +243,14 @@ def test_the_hand_is_where_along_says(along: float) -> None:
 
 
 @pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
-@pytest.mark.parametrize(("degrees", "off"), [(-15.0, 15.0), (0.0, 0.0), (12.0, 0.0), (20.0, 0.0), (50.0, 30.0)])
+@pytest.mark.parametrize(
+    ("degrees", "off"),
+    [(-15.0, 15.0), (0.0, 0.0), (12.0, 0.0), (20.0, 0.0), (50.0, 30.0), (95.0, 75.0), (105.0, 75.0), (190.0, 0.0)],
+)
 def test_a_bar_lies_in_a_fist_up_to_20_degrees_from_across_the_palm(
     side: str, sign: float, degrees: float, off: float
 ) -> None:
-    """On the side of the thumb it is nearer to the fingers; beyond, the first angle is what is too much."""
+    """On the side of the thumb it is nearer to the fingers; beyond, the first angle is what is too much, either way."""
     figure = wb.load("human")
     palm = figure.placement(figure.neutral, f"{side}_palm")
     scene = wb.Scene(figure).add(wb.Capsule(0.02, 0.4), name="bar", at=(0.4, 0.0, 1.1))

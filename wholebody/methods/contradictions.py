@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.geometry.flesh import is_flesh
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Status
@@ -78,6 +79,8 @@ class _Finder:
             if frozen[model.idx_vs[joint] : model.idx_vs[joint] + model.nvExtendeds[joint]].all():
                 self._group[joint] = self._group[model.parents[joint]]
         self._start = state.data
+        # flesh is elsewhere in its joint where a limb is bent
+        self._rigid = np.array([not is_flesh(piece) for piece in workspace.geometry.geometryObjects], dtype=bool)
         self._fixed: dict[int, _FixedGroup] = {0: _FixedGroup(pin.SE3.Identity(), "the world")}
 
     def holds(self) -> None:
@@ -99,7 +102,8 @@ class _Finder:
         group = np.array([self._group[joint] for joint in table.joint.tolist()], dtype=np.intp)
         known = np.isin(group, list(self._fixed))
         pairs = table.pairs
-        fixed = np.flatnonzero((known[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
+        still = known[pairs].all(axis=1) | (group[pairs[:, 0]] == group[pairs[:, 1]])
+        fixed = np.flatnonzero(still & self._rigid[pairs].all(axis=1))
         if not len(fixed):
             return
         center = self._centers(group)
@@ -224,7 +228,8 @@ class _Finder:
         # place of it, however the piece turns: its depth in a thing is at most minus this, less the clearance.
         table, geometry = self._workspace.table, self._workspace.geometry
         for number, name, found, here, wanted in self._wanted():
-            own = {k: self._depth(k, here) for k in np.flatnonzero(table.joint == found.joint).tolist() if found.joint}
+            pieces = (table.joint == found.joint) & self._rigid & (found.joint > 0)
+            own = {k: self._depth(k, here) for k in np.flatnonzero(pieces).tolist()}
             pairs = np.isin(table.pairs, [*own]).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
             depths, deepest, thing = dict[int, float](), 0.0, -1
             for pair in np.flatnonzero(pairs).tolist():
@@ -252,7 +257,7 @@ class _Finder:
         at = goal.residual.placement * found.placement.inverse()
         for pair, (a, b) in enumerate(table.pairs.tolist() if found.joint else ()):
             own, other = (a, b) if table.joint[a] == found.joint else (b, a)
-            if table.joint[own] != found.joint or table.joint[other] != 0:
+            if table.joint[own] != found.joint or table.joint[other] != 0 or not self._rigid[own]:
                 continue
             centre = geometry.geometryObjects[own].placement.translation
             reached = np.linalg.norm(at.act(centre) - geometry.geometryObjects[other].placement.translation)

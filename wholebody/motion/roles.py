@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -131,7 +132,7 @@ def _recognised(joints: tuple[str, ...]) -> dict[str, str]:
 
 
 def _next_to(motion: SkeletonMotion, found: Mapping[str, str]) -> dict[str, str]:
-    """The same roles, with what goes on from a knee or elbow as ankle or wrist, whatever its name."""
+    """The same roles, with what alone goes on from a knee or elbow as ankle or wrist, whatever its name."""
     nearer = {"toe": ("knee", "ankle"), "hand": ("elbow", "wrist")}
     renamed = {}
     for role, joint in found.items():
@@ -140,6 +141,14 @@ def _next_to(motion: SkeletonMotion, found: Mapping[str, str]) -> dict[str, str]
         parent = motion.parents[motion.names.index(joint)]
         own = here not in found and parent >= 0 and motion.names[parent] == found.get(before)
         renamed[here if own else role] = joint
+    above = [motion.names[parent] if parent >= 0 else "" for parent in motion.parents]
+    for joint in (name for name in motion.names if not name.endswith("_end")):  # no end site
+        for side, (before, here) in product(("left", "right"), nearer.values()):
+            alone = (
+                above[motion.names.index(joint)] == renamed.get(f"{side}_{before}") and joint not in renamed.values()
+            )
+            if alone and f"{side}_{here}" not in renamed and above.count(renamed[f"{side}_{before}"]) == 1:
+                renamed[f"{side}_{here}"] = joint
     return renamed
 
 

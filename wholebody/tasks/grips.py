@@ -189,9 +189,10 @@ class Oblique(NamedTuple):
         return ends(np.array([turned]), rows, np.array([self.low]), np.array([self.high]))
 
     def _turned(self, state: State) -> tuple[Array, float, Array]:
-        """The bar's direction (3,) nearer to the palm's y, its angle from y in the palm, and the palm's axes (3, 3)."""
+        """The bar's direction (3,) nearer to the range, its angle from y in the palm, and the palm's axes (3, 3)."""
         way, axes = self.bar.at(state)[1][2], state.frame(self.place.frame).rotation.T
-        way = -way if axes[1] @ way < 0.0 else way
+        middle = 0.5 * (self.low + self.high)
+        way = -way if np.array((np.sin(middle), np.cos(middle), 0.0)) @ axes @ way < 0.0 else way
         return way, float(np.arctan2(axes[0] @ way, axes[1] @ way)), axes
 
 

@@ -26,3 +26,14 @@ def test_a_driver_leaves_a_poor_minimum_that_is_one_without_things_too(number: i
     """Descents from before contact were made only where others failed: measures of 25 to 32 beside 1.8 to 3.0."""
     problem = problem_set("drivers").make(number, 13001).problem
     assert wb.solve(problem).assessment.measure < 3.1  # other searches end at 1.81, 3.01 and 2.16
+
+
+@pytest.mark.parametrize("number", [274, 405, 514])
+def test_starts_seek_less_effort_where_free_postures_were_led_to_contacts(number: int) -> None:
+    """Where those led to no less, starts for less were left out: 1.5 to 2 times the effort."""
+    problem = problem_set("arms_among_things").make(number, 90131).problem
+    limits = problem.scene.figure.limits
+    lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
+    starts = np.random.default_rng(1).uniform(lower, upper, (20, len(lower)))
+    ends = [end.assessment.measure for end in wb.methods.QP().minima(problem, starts) if end.status == "solved"]
+    assert wb.solve(problem).assessment.measure < 1.05 * min(ends)

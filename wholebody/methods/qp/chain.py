@@ -37,7 +37,6 @@ class Met(NamedTuple):
     free: Array | None = None  # (nq,) a posture that does, where q is the start instead, as all ends were blocked
     through: Array | None = None  # (nq,) the end of least effort that does not keep its clearances, where known
     near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
-    led: bool = False  # whether free postures were led to contacts in search of less effort
 
     @property
     def begins(self) -> tuple[Array, ...]:
@@ -229,7 +228,7 @@ class Descents:
                 blocked = other if self.least < SEEDS.worth * most else None
                 q = self.chain.posture(found[0].values, at)
                 met = Met(q, met.trace, found[1], blocked, through=self.blocked)
-        return with_values(met, led=tried > 0)
+        return met
 
     def _free_ends(self, seeds: Array) -> Iterator[Array]:
         """Values (n,) of free ends of descents without measure from seeds, those of least effort first."""

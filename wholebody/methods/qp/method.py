@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from wholebody.assessment.posture import judged
 from wholebody.base.arrays import Array
 from wholebody.base.checks import posture, shown
@@ -92,7 +90,7 @@ class QP(Settings, Descends):
             return ending
         search = QPMultistart(problem, workspace, self._qp_solver(), self, control)
         begin, before = ((), ()) if met is None else (() if met.complete else met.begins, met.trace)
-        known = () if met is None else (met.blocked, met.near, _least(problem, workspace, met))
+        known = () if met is None else (met.blocked, met.near, _measure(problem, workspace, met.through))
         best = search.run(begin, *known)
         starts = f"{search.tried} start{'s' * (search.tried != 1)}"
         return Ending(
@@ -155,9 +153,9 @@ class QP(Settings, Descends):
         return QPTracker(problem, self._qp_solver(), dt, self)
 
 
-def _least(problem: Problem, workspace: Workspace, met: Met) -> float:
-    """The measures where goals are met through things; 0 where nothing is known, inf where starts sought less."""
-    if met.through is None or met.led:
-        return np.inf if met.led else 0.0
-    state = workspace.state.update(met.through)
+def _measure(problem: Problem, workspace: Workspace, q: Array | None) -> float:
+    """The weighted sum of the measures at a posture (nq,); 0 without one."""
+    if q is None:
+        return 0.0
+    state = workspace.state.update(q)
     return sum((term.weight * term.value(state) for term in problem.measures), 0.0)

@@ -56,7 +56,7 @@ class QPMultistart(Search):
         self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = (), least: float = 0
     ) -> LocalSolution:  # fmt: skip
         """The best of attempts, from `begin` first, and a descent from `other`; out of reach, the closest to `near`."""
-        # `least`: measures where the goals are known to be met, if through things; 0: unknown, inf: nothing is less
+        # `least`: measures where the goals are known to be met, if through things; 0 where nothing is known
         self.out_of_reach, self._through_measure = bool(near), least
         self.contradictions = contradictions(self.problem, self.lineariser.workspace) if near else ()
         if not near:

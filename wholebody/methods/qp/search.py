@@ -124,7 +124,7 @@ class Search(Multistart[LocalSolution]):
         return moving(self._shared, self.best.q) < SEARCH.few
 
     def _seeded(self, count: int, around: Array) -> Iterator[Array]:
-        """So many random postures (nq,) around one; throughout the limits where few dofs move the goals."""
+        """Random postures (nq,) around one; throughout the limits where few degrees of freedom move the goals."""
         rng = np.random.default_rng(self.settings.seed)
         draw = throughout if self._few() else restarts
         return self.lineariser.defined(draw(self.problem, self.lineariser.state, around, rng, count))
