@@ -24,7 +24,7 @@ def person() -> wb.Figure:
 @pytest.fixture(scope="module")
 def bent(person: wb.Figure) -> Any:
     joints = {"spine1_flexion": 0.3, "spine2_lateral": 0.1, "left_elbow_flexion": 1.2, "left_shoulder_flexion": 0.7,
-              "left_knee_flexion": 0.4, "left_hip_flexion": 0.5}  # fmt: skip
+              "left_shoulder_abduction": 1.2, "left_knee_flexion": 0.4, "left_hip_flexion": 0.5}  # fmt: skip
     return person.with_joints(person.posture("standing"), joints)
 
 
@@ -140,3 +140,37 @@ def test_who_holds_a_load_brings_it_near(person: wb.Figure) -> None:
     )
     ahead = [person.placement(q, "left_palm").translation[0] for q in (usual, strong)]
     assert ahead[1] < ahead[0] - 0.1
+
+
+def test_a_load_beside_the_shoulder_is_held_by_its_whole_torque(person: wb.Figure) -> None:
+    """By hand: axes square to each other miss nothing of the torque, however the arm is raised."""
+    rng, arm = np.random.default_rng(14), [f"left_shoulder_{way}" for way in ("flexion", "abduction", "rotation")]
+    ways = [np.radians((-60.0, 76.0, 9.0)), *rng.uniform((-1.0, -0.5, -1.0), (2.5, 2.5, 1.0), (20, 3))]
+    model, data, pull = person.model, person.model.createData(), CARRIED[0]
+    first, last = (person.joint_id(name) for name in (arm[0], arm[-1]))
+    for angles in ways:
+        q = person.with_joints(
+            person.posture("standing"), {**dict(zip(arm, angles, strict=True)), "left_elbow_flexion": 1.3}
+        )
+        pin.forwardKinematics(model, data, q)
+        at = data.oMi[last].translation
+        moment = np.cross(person.placement(q, "left_palm").translation - at, pull.force)
+        for joint in (k for k in range(first, model.njoints) if first in list(model.supports[k])):
+            weight = (0.0, 0.0, -9.81 * model.inertias[joint].mass)
+            moment += np.cross(data.oMi[joint].act(model.inertias[joint].lever) - at, weight)
+        term = Exertion([pull]).resolve(wb.Scene(person), q)
+        share = term.statics.efforts(wb.Scene(person).state(q))[0]
+        columns = [model.joints[person.joint_id(name)].idx_v for name in arm]
+        places = [int(np.flatnonzero(term.statics.joints == column)[0]) for column in columns]
+        shares = share[places]
+        torque = np.where(shares > 0.0, term.statics.upper[places], -term.statics.lower[places]) * shares
+        assert np.linalg.norm(torque) == pytest.approx(np.linalg.norm(moment), rel=1e-9)
+
+
+def test_who_holds_a_load_keeps_the_elbows_in(person: wb.Figure) -> None:
+    level = [wb.Plane(f"{side}_palm", (0, 0, 1), point=(0.0, 0.0, 1.0)) for side in ("left", "right")]
+    heavy = [wb.Force(f"{side}_palm", (0.0, 0.0, -196.2)) for side in ("left", "right")]
+    measures = [wb.Effort(), Exertion(heavy, weight=10.0)]
+    q = wb.solve(wb.Problem(wb.Scene(person), constraints=[*FEET, *level, LoadedBalance(heavy)], measures=measures)).q
+    angles = wb.ergonomics.body_angles(person, q)
+    assert max(angles.left.shoulder_abduction, angles.right.shoulder_abduction) < np.radians(45.0)
