@@ -128,8 +128,8 @@ class Run:
                 span, sweeps = span // 2, FINER
                 if span:
                     self._stages.append((partial(self._between, span=span), 3 * span))
-            for parts in MENDED:
-                self._stages += [(partial(self._looked, parts=parts), 0), (self._mended, 2)]
+            for number, parts in enumerate(MENDED):
+                self._stages += [(partial(self._looked, parts=parts, again=number > 0), 0), (self._mended, 2)]
             holds.begin(self._free)
         self._done = [0] * len(self._stages)  # frames that each stage has passed
 
@@ -362,10 +362,10 @@ class Run:
             self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _looked(self, k: int, parts: int) -> None:
-        """Note where the motion from the frame before overlaps: all in a few parts, in more where one does nearby."""
+    def _looked(self, k: int, parts: int, again: bool = False) -> None:
+        """Note where the motion from the frame before overlaps; `again` only where a mend changed one of the two."""
         assert self.holds is not None
-        if not k or self.holds.moved(k) or (parts > MENDED[0] and not any(map(self._dips.get, (k - 1, k, k + 1)))):
+        if not k or self.holds.moved(k) or (again and not any(map(self._dips.get, range(k - 1, k + 3)))):
             return
         known, ends = self._dips.setdefault(k, []), (self._found[k - 1], self._found[k])
         for share in (number / parts for number in range(1, parts)):
