@@ -351,9 +351,10 @@ class Run:
         goals = self._goals(k, reference, BEND / (span * self.dt) ** 2 * self.levers, held)
         before, after = self._found[k - span] if k else None, None if start is None else self._found.get(k + 1)
         q = self.fitter.reached(before, reference if start is None else start, span * self.most)
-        midway = self._midway(k) if span == 1 and omega < LATE else []
+        late = span == 1 and omega < LATE
+        midway, deepest = (self._midway(k), DIP) if late else ([], CLEARANCE)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
-            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > CLEARANCE):
+            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > deepest):
                 break
             if number >= 4 * SWEEP:  # what is wanted draws q to and fro across an edge: then the least way back inside
                 goals, midway = with_values(goals, posture=q), []
