@@ -356,7 +356,8 @@ class Run:
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
             if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > deepest):
                 break
-            if number >= 4 * SWEEP:  # what is wanted draws q to and fro across an edge: then the least way back inside
+            # what is wanted draws q to and fro across an edge: then the least way back inside
+            if number >= (SWEEP if late else 4 * SWEEP):
                 goals, midway = with_values(goals, posture=q), []
             q = self.fitter.careful_step(q, goals, self._room(q, before, span, after), midway)
         if self.holds.touches:
