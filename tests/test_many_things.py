@@ -71,6 +71,17 @@ def answers(scene: wb.Scene) -> dict[str, object]:
     }
 
 
+def test_pairs_without_data_are_measured_where_their_pieces_are_now(no_pair_data: None) -> None:
+    scene = crowd(30)
+    figure, data = scene.figure, scene.model.createData()
+    distances = pair_distances.PairDistances(scene.geometry, scene.pair_table.pairs)
+    for share in (0.0, 0.5, 0.5, 0.0):  # parts move, things do not, and then nothing does
+        q = figure.clamp(pin.integrate(scene.model, figure.neutral, np.full(scene.model.nv, share)))
+        pin.forwardKinematics(scene.model, data, q)
+        distances.place(scene.model, data)
+        np.testing.assert_allclose(distances.all_measured()[:, 0], by_coal(scene, data, q), atol=1e-6)
+
+
 def test_no_answer_depends_on_whether_data_are_kept_for_each_pair(request: pytest.FixtureRequest) -> None:
     kept = answers(crowd(120))
     request.getfixturevalue("no_pair_data")

@@ -132,6 +132,8 @@ class SinglePairs:
 
     def __init__(self, geometry: pin.GeometryModel) -> None:
         self._geometry = geometry
+        self._pieces, self._places = dict[int, Any](), dict[int, Any]()  # of those asked for: shape, placement
+        self._at = np.full((geometry.ngeoms, 4, 3), np.nan)  # where `_places` have them
         self._vector = coal.StdVec_DistanceResult()
         self._results: list[Any] = []
         self._view: Array | None = None
@@ -142,8 +144,13 @@ class SinglePairs:
             self._vector.extend([coal.DistanceResult() for _ in range(ROOM)])
             self._results, self._view = list(self._vector), result_view(self._vector)
         found = np.empty((len(pairs), RESULT_FIELDS))
-        pieces = {k: self._geometry.geometryObjects[k].geometry for k in np.unique(pairs).tolist()}
-        places = {k: coal.Transform3s(placements[k, :3].T, placements[k, 3]) for k in pieces}
+        pieces, places, asked = self._pieces, self._places, np.unique(pairs)
+        moved = asked[(self._at[asked] != placements[asked]).any(axis=(1, 2))]  # most are of things that stand
+        for k in moved.tolist():
+            if k not in pieces:
+                pieces[k] = self._geometry.geometryObjects[k].geometry
+            places[k] = coal.Transform3s(placements[k, :3].T, placements[k, 3])
+        self._at[moved] = placements[moved]
         request = coal.DistanceRequest()
         for begin in range(0, len(pairs), ROOM):
             some = pairs[begin : begin + ROOM].tolist()

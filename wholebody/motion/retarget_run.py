@@ -128,8 +128,8 @@ class Run:
                 span, sweeps = span // 2, FINER
                 if span:
                     self._stages.append((partial(self._between, span=span), 3 * span))
-            for parts in MENDED:
-                self._stages += [(partial(self._looked, parts=parts), 0), (self._mended, 2)]
+            for number, parts in enumerate(MENDED):
+                self._stages += [(partial(self._looked, parts=parts, again=number > 0), 0), (self._mended, 2)]
             holds.begin(self._free)
         self._done = [0] * len(self._stages)  # frames that each stage has passed
 
@@ -351,21 +351,23 @@ class Run:
         goals = self._goals(k, reference, BEND / (span * self.dt) ** 2 * self.levers, held)
         before, after = self._found[k - span] if k else None, None if start is None else self._found.get(k + 1)
         q = self.fitter.reached(before, reference if start is None else start, span * self.most)
-        midway = self._midway(k) if span == 1 and omega < LATE else []
+        late = span == 1 and omega < LATE
+        midway, deepest = (self._midway(k), DIP) if late else ([], CLEARANCE)
         for number in range(8 * SWEEP):  # more than the usual where cones, or contacts, are curved
-            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > CLEARANCE):
+            if number >= SWEEP and not (self.fitter.outside(q) or self.fitter.depth(q) > deepest):
                 break
-            if number >= 4 * SWEEP:  # what is wanted draws q to and fro across an edge: then the least way back inside
+            # what is wanted draws q to and fro across an edge: then the least way back inside
+            if number >= (SWEEP if late else 4 * SWEEP):
                 goals, midway = with_values(goals, posture=q), []
             q = self.fitter.careful_step(q, goals, self._room(q, before, span, after), midway)
         if self.holds.touches:
             self.holds.touch(k, q, self.fitter.held(q), held)
         self._found[k], self._deviation[k] = q, np.asarray(pin.difference(self.model, self._free[k], q))
 
-    def _looked(self, k: int, parts: int) -> None:
-        """Note where the motion from the frame before overlaps: all in a few parts, in more where one does nearby."""
+    def _looked(self, k: int, parts: int, again: bool = False) -> None:
+        """Note where the motion from the frame before overlaps; `again` only where a mend changed one of the two."""
         assert self.holds is not None
-        if not k or self.holds.moved(k) or (parts > MENDED[0] and not any(map(self._dips.get, (k - 1, k, k + 1)))):
+        if not k or self.holds.moved(k) or (again and not any(map(self._dips.get, range(k - 1, k + 3)))):
             return
         known, ends = self._dips.setdefault(k, []), (self._found[k - 1], self._found[k])
         for share in (number / parts for number in range(1, parts)):
