@@ -24,14 +24,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, cross, with_values
 from wholebody.base.checks import TIME_STEP
 from wholebody.dynamics import impulse_kernel, solve_kernel
-from wholebody.dynamics.blows import BOUNCE, undo
 from wholebody.dynamics.coupling import Actuated, Moved, Points, drift, torques
 from wholebody.dynamics.frame import EngineFrame, impacts
 from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.sleeping import AFTER, STILL
 from wholebody.dynamics.step_program import SKIN, Impulses
-from wholebody.dynamics.touching import Touching
+from wholebody.dynamics.touching import BOUNCE, Touching, undo
 from wholebody.figures.state import free_roots
 from wholebody.scene.scene import Scene
 

@@ -1,4 +1,4 @@
-"""What a figure that yields can touch within a step: its points, and those of the things that it touches."""
+"""What a figure that yields can touch within a step: its points, those of things, and their blows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, Mask, cross
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Moved, Points, approaches
-from wholebody.dynamics.frame import Given
+from wholebody.dynamics.frame import EngineFrame, Given
 from wholebody.dynamics.pieces import Surfaces, needed, places
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN, TOUCH
@@ -18,6 +18,8 @@ from wholebody.geometry.contact_rows import ContactRowBuilder, compiled_kernel
 from wholebody.geometry.flesh import flesh_of
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
+
+BOUNCE = 0.1  # m/s: slower rebounds, of up to 0.5 mm, are left out
 
 
 class Touching:
@@ -152,3 +154,25 @@ class Touching:
         return self._engine is not None and bool(
             self._engine.state.bodies.moving[[self._number[name] for name in bodies]].any()
         )
+
+
+def undo(engine: RigidBodies, frame: EngineFrame, began: Array, most: float) -> None:
+    """Give the things that were pushed in a step the velocities that they would have without.
+
+    To the engine the motion of the figure is given, which brings energy. The next step has the blows at its start.
+
+    Args:
+        engine: after the step.
+        frame: the step.
+        began: (n, 6) the twists of the engine's bodies that weight alone would give them.
+        most: energy of the things before, J.
+    """
+    things = frozenset(engine.bodies) & frame.wrenches.keys()
+    pushed = np.array([name in things for name in engine.names])
+    for number in np.flatnonzero(pushed).tolist():
+        name = engine.names[number]
+        change = began[number] - engine.twist(name)
+        wrench = np.asarray(np.linalg.lstsq(engine.response(name), change, rcond=None)[0], dtype=np.float64)
+        engine.push_about_centre(name, wrench)
+    if (gain := engine.energy() - most) > 0.0:  # they are not where they would be
+        engine.state.slow(pushed, gain)

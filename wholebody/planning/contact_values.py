@@ -122,9 +122,8 @@ class _Gaps:
         geometry = workspace.geometry.copy()
         geometry.removeAllCollisionPairs()
         pairs = dict[tuple[int, int], int]()
-        self._slots = list[
-            tuple[Indices, Array]
-        ]()  # of each gap its pairs by number, and 1 where they are the same way
+        # of each gap its pairs by number, and 1 where they are the same way, else -1
+        self._slots = list[tuple[Indices, Array]]()
         for gap in gaps:
             numbers, ways = list[int](), list[float]()
             for one in gap.first.pieces:

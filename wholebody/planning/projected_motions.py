@@ -54,6 +54,9 @@ class ProjectedMotions(Geodesics):
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
+        low, high = self._kept.sides  # where an iteration brings values: to these alone, rounding leaves them beyond
+        room = np.minimum(WITHIN, 0.5 * (high - low))
+        self._aims: Array = np.where(self._equal, self._bounds, [low + room, high - room])
         self._away = np.zeros(self._model.nv)
         self._on = set[bytes]()  # postures that were seen to be on what is held
         self._last = b"", self._packed(problem.start, -1.0)  # the posture that was linearised last, and what is there
@@ -86,16 +89,9 @@ class ProjectedMotions(Geodesics):
         least = np.maximum(self._least + MISSED + self.bent, 0.0)
         self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
 
-    def _aims(self) -> Array:
-        """(2, c) where an iteration brings values: to sides alone, rounding would leave them beyond."""
-        sides = self._kept.sides
-        room = np.minimum(WITHIN, 0.5 * (sides[1] - sides[0]))
-        return np.where(self._equal, self._bounds, sides + room * np.array([[1.0], [-1.0]]))
-
     def _projected(self, q: Array) -> Array | None:
-        aims = self._aims()
         for _ in range(ITERATIONS):
-            q, missed = self._displaced(q, self._kept.sides, aims)
+            q, missed = self._displaced(q, self._kept.sides, self._aims)
             if not missed:
                 return q
         return None
@@ -121,7 +117,7 @@ class ProjectedMotions(Geodesics):
             self._reach[tip] = self._aimed.lineariser(self._workspace)
         reach = self._reach[tip]
         reach.take((goal,), reach.clearances)
-        aims = np.hstack([np.zeros((2, 3)), self._aims()])
+        aims = np.hstack([np.zeros((2, 3)), self._aims])
         for _ in range(6):  # more = nearer to places out of reach, dearer
             at = reach.packed(q, -1.0)
             if not displace(at.jacobian, at.value, aims, aims, at.box, self._away):
@@ -183,7 +179,7 @@ class ProjectedMotions(Geodesics):
         if known == q.tobytes():
             rows = at.jacobian[: len(at.value)]
             value, box = at.value + rows @ motion, at.box - motion
-            if displace(rows, value, self._kept.sides, self._aims(), box, self._away):
+            if displace(rows, value, self._kept.sides, self._aims, box, self._away):
                 motion = motion + self._away
         return np.asarray(pin.integrate(self._model, q, motion))
 

@@ -27,9 +27,7 @@ AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
 LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
-ASIDE = (
-    0.6  # of the samples beside what is held: a limb that moves, or its tip, is elsewhere; more = less else is tried
-)
+ASIDE = 0.6  # of samples beside what is held: a limb that moves or its tip is elsewhere; more = less else is tried
 LIMBS = 0.7  # of these: joints of the limb are random; of others its tip is displaced, and all else follows
 POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
 

@@ -154,10 +154,9 @@ def reach_trials(
         ends.append(local)
         near = local if near is None or local.violation.total < near.violation.total else near
         most = SEARCH.agree * near.violation.total + tolerance
-        if sum(end.violation.total <= most for end in ends) == agreeing:
-            return ReachTrials(
-                True, near, spent, tuple(end.q for end in ends if end is not near and end.violation.total <= most)
-            )
+        alike = [end for end in ends if end.violation.total <= most]
+        if len(alike) == agreeing:
+            return ReachTrials(True, near, spent, tuple(end.q for end in alike if end is not near))
     return ReachTrials(False, near, spent)
 
 
