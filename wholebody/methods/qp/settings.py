@@ -179,7 +179,7 @@ class SearchNumbers(NamedTuple):
     moved: float = 0.99  # share below which they are looked for again, at the place of that minimum. More: slower.
     # share of what the start misses below which who sits is tried on the seat too. More: in vain of those beside it.
     nearer: float = 0.9
-    poor_contact: float = 5.0  # rad^2: measures of contacts beyond which they are also met from before. More: poorer.
+    poor_contact: float = 2.5  # rad^2: measures of contacts beyond which they are also met from before. More: poorer.
     poor: int = 2  # starts for the measures where it is none after all. More: lower, slower.
     screened: int = 4  # feasible postures that are looked for, for each descended from. More: lower measures, slower.
     # starts that seek lower minima, for each factor e that things multiply the measures by. More: lower, slower.
