@@ -13,6 +13,18 @@ from wholebody.view.composition import Composition
 LENGTHS = (0.5, 0.4)
 
 
+class Ceiling(wb.Constraint):
+    """The first body stays below a height."""
+
+    lower, upper = np.array([-np.inf]), np.array([0.3])
+
+    def value(self, state):
+        return state.q[2:3]
+
+    def jacobian(self, state):
+        return np.eye(1, state.model.nv, 2)
+
+
 def named(problem, q):
     return {str(blocker): blocker for blocker in wb.assess(problem, q).blockers}
 
@@ -30,6 +42,26 @@ def test_a_joint_at_its_limit_is_named_and_one_away_from_it_is_not(planar_arm):
     assert set(found) == {"the limit of turn0"}
     assert found["the limit of turn0"].share == 1.0
     assert not found["the limit of turn0"].violated
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["upper", "lower"])
+def test_a_limit_is_named_where_a_joint_is_exactly_at_it_or_nearly(planar_arm, sign):
+    scene = wb.Scene(planar_arm(LENGTHS, limit=1.0))
+    goal = wb.Point("tip", (0.5 * np.cos(1.4), sign * 0.9 * np.sin(1.4), 0.0))
+    problem = wb.Problem(scene, goals=[goal])
+    for off in (0.0, 5e-5):  # nearer than what counts as active
+        assert set(named(problem, sign * np.array([1.0 - off, 0.2]))) == {"the limit of turn0"}
+    assert named(problem, sign * np.array([0.9, 0.2])) == {}
+
+
+def test_a_constraint_with_an_upper_bound_alone_pushes_down(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1)))
+    q = scene.figure.neutral
+    q[2] = 0.3
+    for height, balanced in ((1.0, True), (-1.0, False)):
+        problem = wb.Problem(scene, goals=[wb.Point("body0", (0.0, 0.0, height))], constraints=[Ceiling()])
+        assert set(named(problem, q)) == ({"constraints[0], Ceiling"} if balanced else set())
+        assert (wb.assess(problem, q).optimality < 1e-9) == balanced
 
 
 def test_a_frozen_joint_is_told_from_one_at_its_limit(planar_arm):
@@ -58,7 +90,7 @@ def test_two_walls_share_by_how_hard_they_push(free_bodies):
     scene.add(wb.Box((4.0, 0.1, 4.0)), name="in y", at=(0.0, 0.15, 0.0))
     problem = wb.Problem(scene, goals=[wb.Point("body0", (3.0, 1.0, 0.0))])
     found = named(problem, scene.figure.neutral)
-    assert set(found) == {"body0 against in x", "body0 against in y"}
+    assert list(found) == ["body0 against in x", "body0 against in y"]  # the strongest first
     assert found["body0 against in y"].share == pytest.approx(1.0 / 3.0, rel=1e-3)
 
 

@@ -60,6 +60,12 @@ def test_a_way_through_a_plate_is_seen_though_both_ends_are_free(beside_a_plate:
     assert deepened(beside_a_plate, motion).tolist() == [np.inf, motion_assessment.DEPTHS[0]]
 
 
+def test_a_thing_that_passes_through_a_resting_arm_is_seen_in_the_frame_in_which_it_does(planar_arm: Arms) -> None:
+    scene = wb.Scene(planar_arm((0.4, 0.3))).add(wb.Box((0.1, 0.01, 0.2)), name="plate", at=(0.5, 0.4, 0.0))
+    at = [pin.SE3(np.eye(3), np.array([0.5, y, 0.0])) for y in (0.4, 0.2, -0.2, -0.4)]
+    assert frames_passed_through(scene, np.zeros((4, 2)), 1e-3, {"plate": at}) == (2,)
+
+
 def test_a_joint_without_limits_has_jerk() -> None:
     model = pin.Model()
     model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "turn")  # two coordinates, one degree of freedom
