@@ -21,7 +21,8 @@ GOALS: dict[str, list[wb.Goal]] = {
 }
 
 
-LINK = """<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+LINK = """<link name="{name}"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin xyz="0 0 0.12"/><geometry><box size="0.1 0.1 0.24"/></geometry></collision></link>"""
 JOINT = """<joint name="to_{name}" type="{kind}"><parent link="{parent}"/><child link="{name}"/><origin xyz="0 0 0.25"/>
 <axis xyz="{axis}"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>"""
