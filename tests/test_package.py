@@ -33,7 +33,6 @@ ROOMS = (
         "view",
         "studies",
         "bench",
-        "doctor",
         "cli",
     ),
 )

@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from wholebody.cli.tables import console
-from wholebody.doctor import examine
+from wholebody.cli.examination import examine
 from wholebody.version import __version__
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}

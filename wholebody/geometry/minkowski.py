@@ -20,10 +20,6 @@ from wholebody.geometry.pieces import COAL_ACCURACY, SweptPoints, normal_across,
 
 Placed: TypeAlias = tuple[Any, pin.SE3]  # a coal geometry and its placement in the world
 
-MOST_POINTS = 20_000
-"""Number of vertices of a Minkowski difference up to which its sides are enumerated."""
-
-
 OVERLAP = 2.0 * COAL_ACCURACY  # depth up to which a pair counts as touching, metres: twice coal's own tolerance
 
 
@@ -37,15 +33,18 @@ class _Body:
         self.points: Array = self.swept.points @ rotation.T + self.center
         self.axis: Array = rotation @ self.swept.axis
         self.plane: Array | None = None
-        self.round = self.swept.radius > 0.0
         self.radii: Array | None = None
         if not len(self.points):
             if np.isinf(self.swept.reach):
                 self.plane = rotation @ self.swept.faces[0, :3]
                 self.offset = float(self.swept.faces[0, 3] + self.plane @ self.center)
             else:
-                self.round = True
                 self.radii = rotation * np.asarray(self.geometry.radii)
+
+    @property
+    def out(self) -> Array | None:
+        """(3,) along which this piece leaves others, if it is a half-space; None otherwise."""
+        return None if self.plane is None else -self.plane
 
     def support(self, normals: Array) -> Array:
         """The greatest n . x over the piece for each row n: (k,)."""
@@ -75,12 +74,9 @@ class ObjectPair:
         self._reach = np.array([x.swept.reach for x in self.a])[:, None] + np.array([x.swept.reach for x in self.b])
         if allowed is not None:
             self._reach = np.where(allowed, self._reach, -np.inf)
-        self._sides: dict[tuple[int, int], Sides] = {}
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._at_a = [_transform(x.placement) for x in self.a]
         self._at_b = [_transform(x.placement) for x in self.b]
-        most = max(len(x.points) for x in self.a) * max(len(x.points) for x in self.b)
-        self.enumerable = most <= MOST_POINTS and not any(x.round for x in (*self.a, *self.b))
 
     def overlapping(self, translation: Array, tolerance: float) -> tuple[list[tuple[int, int]], Array, Array]:
         """Pairs deeper than `tolerance`: (i, j), depths (k,), and normals (k, 3) out of B into A."""
@@ -116,7 +112,8 @@ class ObjectPair:
             depth, normal = self.measure(int(i), int(j), translation)
             side = self.rows(int(i), int(j), normal[None])
             if not len(side.offsets):  # a half-space has one side, and coal's normal differs from it by rounding
-                side = self.sides(int(i), int(j))
+                planes = [plane for plane in (self.b[j].plane, self.a[i].out) if plane is not None]
+                side = self.rows(int(i), int(j), np.array(planes))
             slack = side.normals @ translation - side.offsets
             best = int(np.argmax(slack))
             if depth > OVERLAP or slack[best] < -OVERLAP:
@@ -125,30 +122,15 @@ class ObjectPair:
             offsets.append(min(side.offsets[best], float(side.normals[best] @ translation)))
         return Sides(np.array(normals), np.array(offsets)) if normals else None
 
-    def sides(self, i: int, j: int) -> Sides:
-        """Every side of O_ij, a polytope or a half-space."""
-        if (i, j) not in self._sides:
-            self._sides[i, j] = self.rows(i, j, self._normals(self.a[i], self.b[j]))
-        return self._sides[i, j]
-
     def rows(self, i: int, j: int, normals: Array) -> Sides:
         """Sides of O_ij with these normals (k, 3); those in whose direction it is unbounded are left out."""
         offsets = self.b[j].support(normals) + self.a[i].support(-normals)
         finite = np.isfinite(offsets)
         return Sides(normals[finite], offsets[finite])
 
-    def _normals(self, a: _Body, b: _Body) -> Array:
-        from scipy.spatial import ConvexHull
-
-        if a.plane is not None or b.plane is not None:
-            return np.array([side for side in (b.plane, None if a.plane is None else -a.plane) if side is not None])
-        corners = (b.points[:, None] - a.points).reshape(-1, 3)
-        normals = ConvexHull(corners - corners.mean(axis=0)).equations[:, :3]
-        return np.asarray(normals[np.unique(np.round(normals, 9), axis=0, return_index=True)[1]])
-
     def escapes(self) -> Array:
         """Translations (k, 3) that move the hull of A out of that of B, one for each of many directions."""
-        planes = [x.plane for x in self.b if x.plane is not None] + [-x.plane for x in self.a if x.plane is not None]
+        planes = [plane for plane in (*(x.plane for x in self.b), *(x.out for x in self.a)) if plane is not None]
         normals = np.vstack([_net(), *[plane[None] for plane in planes]])
         ahead = np.max([x.support(normals) for x in self.b], axis=0)
         length = ahead + np.max([x.support(-normals) for x in self.a], axis=0)

@@ -1,15 +1,13 @@
 """Penetration of two objects: the global penetration depth of unions of convex pieces, and the least separation.
 
 The least separation is the point nearest to the origin outside the union of the Minkowski differences of all pairs (see
-`wholebody.geometry.minkowski`). The problem is not convex, because each pair may separate on any side. It is solved by
-branch and bound. A node fixes the side of separation of some pairs, n . t >= h(n), and its bound is the QP  min |t|^2
-under these rows. If another pair overlaps at the QP's answer, the node branches over the sides of that pair. Nodes are
-processed in the order of their bounds, so the first one without overlap is the least.
+`wholebody.geometry.minkowski`). The problem is not convex, because each pair may separate on any side. So it is the best
+of many local searches: each begins at the first free place along a direction, keeps the plane that separates each pair
+there, and takes the least translation under these planes, n . t >= h(n), until it becomes no shorter.
 """
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
@@ -33,7 +31,6 @@ class ObjectPenetration(NamedTuple):
         global_depth: (3,) PD_g, metres, out of B into A: the estimate of `global_depth`.
         separation: (3,) least translation of A that separates all pairs of pieces, metres.
         separated: whether the translation separates them (verified by coal); false if none can.
-        least: whether no shorter translation exists, proven; see `Separation`.
         pairs: number of overlapping pairs of pieces.
     """
 
@@ -42,7 +39,6 @@ class ObjectPenetration(NamedTuple):
     global_depth: Array
     separation: Array
     separated: bool
-    least: bool
     pairs: int
 
 
@@ -79,7 +75,7 @@ def object_penetration(
         return None
     way = least_separation(pieces_a, pieces_b, allowed)
     depth = global_depth(depths, normals)
-    return ObjectPenetration(a, b, depth, way.translation, way.separated, way.least, len(overlap))
+    return ObjectPenetration(a, b, depth, way.translation, way.separated, len(overlap))
 
 
 def object_penetrations(
@@ -132,15 +128,6 @@ class Separation(NamedTuple):
 
     translation: Array  # (3,) metres
     separated: bool  # whether coal finds no overlap after it
-    # whether no shorter one exists, proven. Of round pieces, whose sides are not enumerated, there is seldom a proof:
-    # then the translation is the best of many local searches.
-    least: bool
-
-
-class _Node(NamedTuple):
-    translation: Array
-    normals: Array
-    offsets: Array
 
 
 def least_separation(
@@ -151,49 +138,10 @@ def least_separation(
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
     best = min(escapes, key=lambda way: float(way @ way), default=None)
-    least = False
-    if pairs.enumerable:
-        best, least = _search(pairs, best)
-    if best is not None and not least:
-        best = _descents(pairs, best, escapes)
     if best is None:
-        return Separation(np.zeros(3), False, False)
-    # No translation can be shorter than the depth of the deepest pair alone.
-    depths = pairs.overlapping(np.zeros(3), TOUCHING)[1]
-    least = least or bool(np.linalg.norm(best) <= depths.max(initial=0.0) + OVERLAP)
-    return Separation(best, not pairs.overlapping(best, OVERLAP)[0], least)
-
-
-def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
-    """Branch and bound: the best translation without overlap, and whether it is proven to be the least."""
-    limit = np.inf if best is None else float(best @ best)
-    queue = [(0.0, 0, _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0)))]
-    made = 0
-    # Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof.
-    for _ in range(400):
-        if not queue:
-            return best, best is not None
-        _, _, node = heapq.heappop(queue)
-        found, depths, _ = pairs.overlapping(node.translation, TOUCHING)
-        if not found:
-            return node.translation, True
-        for child in _children(pairs, node, found[int(np.argmax(depths))]):
-            value = float(child.translation @ child.translation)
-            if value < limit:
-                made += 1
-                heapq.heappush(queue, (value, made, child))
-    return best, False
-
-
-def _children(pairs: ObjectPair, node: _Node, deepest: tuple[int, int]) -> list[_Node]:
-    """One node for each side of the deepest pair that can be reached with the sides already chosen."""
-    sides = pairs.sides(*deepest)
-    answers = _nearest_on_rows(sides, node.normals, node.offsets)
-    return [
-        _Node(answer, np.vstack([node.normals, normal]), np.append(node.offsets, offset))
-        for answer, normal, offset in zip(answers, sides.normals, sides.offsets, strict=True)
-        if np.isfinite(answer[0])
-    ]
+        return Separation(np.zeros(3), False)
+    best = _descents(pairs, best, escapes)
+    return Separation(best, not pairs.overlapping(best, OVERLAP)[0])
 
 
 def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
@@ -218,7 +166,7 @@ def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
 
 
 def _descents(pairs: ObjectPair, best: Array, escapes: Array) -> Array:
-    """Local searches from the first free position along many directions, for problems that `_search` cannot finish."""
+    """The best of local searches from the first free position along many directions."""
     best = _descent(pairs, best)
     lengths = np.linalg.norm(escapes, axis=1)
     for escape, length in zip(escapes, lengths, strict=True):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, islice, repeat
 from math import inf
 from typing import Annotated, Any
 
@@ -66,7 +65,7 @@ class CCD(Checked, Descends):
     Attributes:
         tolerance: metres and radians to which goals are met.
         iterations: most sweeps from one start.
-        restarts: most further starts, first near the present posture, then anywhere within the limits.
+        restarts: most further starts, anywhere within the limits.
         seed: of the restarts and of the order of the chains in overlap resolution.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
@@ -188,8 +187,7 @@ class _Search(Multistart[_Trial]):
         yield Attempt([start], lambda q: self._attempt(q, free, ""), "")
         self.contradictions = contradictions(self._problem, self._workspace)
         if not self.enough():
-            sizes = islice(chain((0.05, 0.2, 0.6), repeat(inf)), self._method.restarts)  # rad: nearby, then anywhere
-            starts = (self._reach.disturbed(start, size, self._rng) for size in sizes)
+            starts = (self._reach.disturbed(start, inf, self._rng) for _ in range(self._method.restarts))
             yield Attempt(starts, lambda q: self._attempt(q, free, "restart"), "")
 
     def _closed(self, best: _Trial) -> _Trial:

@@ -128,9 +128,9 @@ class FigureBodies:
         low[limits.idx_q], high[limits.idx_q] = limits.lower, limits.upper
         self._places: Indices = np.array([self.model.joints[row[0]].idx_q for row in self._turning], dtype=np.intp)
         self.low, self.high = low[self._places], high[self._places]
-        finite = np.isfinite(self.low + self.high)
+        finite = np.isfinite(self.low) & np.isfinite(self.high)
         center = np.zeros(len(pairs))
-        center[finite] = 0.5 * (self.low + self.high)[finite]
+        center[finite] = 0.5 * (self.low[finite] + self.high[finite])
         labels = [f"the limit of {self.names[row[0] - 1]!r}" for row in self._turning]
         forms = relative_forms(*axes)[:, 2:]
         self.angles = Angle(turning, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))

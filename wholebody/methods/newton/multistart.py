@@ -22,11 +22,8 @@ from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.newton.terms import FigureSystem
-from wholebody.methods.simplification import beyond_reach
 from wholebody.methods.starts import Attempt, Multistart, off_limits, restarts
 from wholebody.solution import TraceEntry
-from wholebody.tasks.frame import Frame
-from wholebody.tasks.point import Point
 
 
 @dataclass(frozen=True)
@@ -77,8 +74,9 @@ class NewtonMultistart(Multistart[SearchResult]):
     def everywhere(self, q: Array) -> Ending:
         """The best result of all starts; if it solves the problem, its measures are minimised."""
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
-        hopeless = least_left(self.contradictions) is None
-        self.search(self._attempts(q, hopeless))
+        least = least_left(self.contradictions)  # of a goal that is out of reach no other start solves the problem
+        hopeless = least is None
+        self.search(self._attempts(q, hopeless, STARTS.beyond if least else None))
         if not self.control.over:
             if not self.best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
                 self.accept(self._least_violation(q))
@@ -88,14 +86,13 @@ class NewtonMultistart(Multistart[SearchResult]):
             self.contradictions = ()  # by less than the tolerance
         return self._ending()
 
-    def _attempts(self, q: Array, hopeless: bool) -> Iterator[Attempt[SearchResult]]:
+    def _attempts(self, q: Array, hopeless: bool, count: int | None) -> Iterator[Attempt[SearchResult]]:
         most = STARTS.trial if hopeless else self.settings.iterations
         yield Attempt([q], lambda start: self._go(start, most), "")
         if hopeless:
             return
         self._most = self.iterations + STARTS.iterations
         given = self.active_system.problem, self.active_system.workspace.state, q
-        count = STARTS.beyond if self._beyond_reach() else None
         bent = off_limits(*given)
         others = restarts(*given, np.random.default_rng(self.settings.seed), self.settings.restarts)
         bents = [] if bent is None else [*filter(self.active_system.defined, [bent])]
@@ -109,20 +106,6 @@ class NewtonMultistart(Multistart[SearchResult]):
         if self.better(found, self.best) and not found.reached.stationary and not self.solves(found):
             found = self._go(found.q, self.settings.iterations)
         return found
-
-    def _beyond_reach(self) -> bool:
-        """Whether a goal is out of reach for certain, so that no other start can solve the problem."""
-        problem = self.active_system.problem
-        for goal in problem.goals:
-            if isinstance(goal, Point):
-                offset, at = goal.resolved_offset, goal.resolved_target
-            elif isinstance(goal, Frame):
-                offset, at = np.zeros(3), goal.residual.placement.translation
-            else:
-                continue
-            if beyond_reach(problem, goal.frame, offset, at[None])[0] > self.settings.assessed_tolerance:
-                return True
-        return False
 
     def _ending(self) -> Ending:
         """The best result as the end of the search."""

@@ -5,7 +5,7 @@ import re
 import sys
 from pathlib import Path
 
-from wholebody.doctor.examination import (
+from wholebody.cli.examination import (
     EXTRAS,
     MODULES,
     Conflict,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor import examination
-from wholebody.doctor.examination import EXTRAS, MODULES, Distribution, Outcome
+from wholebody.cli import examination
+from wholebody.cli.examination import EXTRAS, MODULES, Distribution, Outcome
 
 Fake = Callable[..., None]
 

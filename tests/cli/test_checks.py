@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor.examination import run
+from wholebody.cli.examination import run
 
 FROM_SCRATCH = True
 
