@@ -159,6 +159,20 @@ def test_feet_rest_where_they_do(height: Terrain) -> None:
         assert each.height == pytest.approx(height(round(foot / STEP) * STEP) - lowest, abs=0.02)
 
 
+@pytest.mark.parametrize("size", [0.4, 3.0])
+def test_skeletons_of_any_size_rest_when_a_person_does(size: float, tmp_path: Path) -> None:
+    """A toy and a giant climb stairs; a robot that gets their walks goes as behind the person."""
+    motion, _ = walker(stairs)
+    own, other = wb.motion.ground(motion), wb.motion.ground(motion.resized(size))
+    for role, mask in own.rests.items():
+        assert (other.rests[role] == mask).mean() > 0.98
+    assert other.levels == pytest.approx(tuple(size * level for level in own.levels), abs=0.005 * size)
+    for one, big in zip(own.footholds, other.footholds, strict=True):
+        assert np.abs(big.place - size * one.place).max() < 0.01 * size
+    level, figure = walker(flat, 1.0)[0], robot(tmp_path)
+    assert np.abs(wb.retarget(level.resized(size), figure).q - wb.retarget(level, figure).q).max() < 0.02
+
+
 def test_levels_are_found() -> None:
     assert wb.motion.ground(walker(flat)[0]).levels == (0.0,)
     found = wb.motion.ground(walker(stairs)[0])
@@ -315,6 +329,16 @@ def test_speed_limits_hold() -> None:
     clip = wb.retarget(motion, slow)
     assert np.abs(clip.velocities()[:, 6:]).max() < 3.0 * (1.0 + 1e-3)
     assert not wb.check(clip).speeds
+
+
+def test_first_frames_are_mended_within_speed_limits(shared_data: Path) -> None:
+    """Frames of which a motion between the first two overlaps; no posture is before the first one."""
+    slow = wb.load("human")
+    slow.model.velocityLimit = np.concatenate([np.full(6, np.inf), np.full(slow.model.nv - 6, 4.0)])
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_03.bvh").part(8, 20)
+    clip = wb.retarget(dataclasses.replace(motion, dt=1 / 30), slow)
+    hinges = [joint.idx_q for joint in slow.model.joints[2:] if joint.nq == 1]
+    assert np.abs(np.diff(clip.q[:, hinges], axis=0)).max() < 4.0 / 30.0 * (1.0 + 1e-6)
 
 
 @pytest.fixture

@@ -128,6 +128,11 @@ def read_clip(
 
 
 def _say(motion: SkeletonMotion, path: Path) -> None:
+    if motion.dt > 0.25 and len(motion) > 2:  # s: a step takes two frames then, and nothing tells when a foot rests
+        warn(
+            f"{one_line(path.name)}: its frames are {motion.dt:g} s apart, and speeds are of that; recordings have 20 "
+            "or more a second: if it has, correct it with dataclasses.replace(motion, dt=1 / 30)"
+        )
     for note in motion.notes:
         logging.getLogger(__name__).info("%s: %s", one_line(path.name), note)
 

@@ -349,7 +349,8 @@ class Run:
             self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)
         held = self._held[k][1]
         goals = self._goals(k, reference, BEND / (span * self.dt) ** 2 * self.levers, held)
-        before, after = self._found[k - span] if k else None, None if start is None else self._found.get(k + 1)
+        after = None if start is None else self._found.get(k + 1)
+        before = self._found[k - span] if k else after
         q = self.fitter.reached(before, reference if start is None else start, span * self.most)
         late = span == 1 and omega < LATE
         midway, deepest = (self._midway(k), DIP) if late else ([], CLEARANCE)

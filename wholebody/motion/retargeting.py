@@ -37,7 +37,7 @@ from wholebody.motion.roles import Roles, matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import point_paths
 from wholebody.motion.standing_ground import NOTHING, Ground, ground_on
-from wholebody.motion.structure import LIMBS
+from wholebody.motion.structure import LIMBS, size_of
 from wholebody.motion.surfaces import Surface, surface_of
 from wholebody.motion.thing_contacts import (
     ThingContact,
@@ -263,7 +263,8 @@ def _contacts(
     touching, figure = _touching(joints, roles), alone.figure
     contacts = things.contacts(motion, touching)
     busy = [one[:3] for one in contacts] + [one[:3] for one in ground.footholds]
-    if rests := own_rests(motion, joints, shares := hand_shares(touching), busy):
+    grown = motion.resized(1.0 / size_of(motion, joints))
+    if rests := own_rests(grown, joints, shares := hand_shares(touching), busy):
         parts = ((role, share, 0) for role, share in shares.items())
         hands = {point.role: point for point in touching_points(figure, roles, motion, parts, joints)}
         contacts += own_contacts(rests, figure, roles, hands, alone.free)

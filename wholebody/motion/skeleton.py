@@ -104,6 +104,10 @@ class SkeletonMotion:
         frames = slice(first, last)
         return replace(self, rotations=self.rotations[frames], positions=self.positions[frames])
 
+    def resized(self, factor: float) -> SkeletonMotion:
+        """The same motion of a skeleton of which all lengths are multiplied."""
+        return replace(self, offsets=factor * self.offsets, positions=factor * self.positions)
+
     @classmethod
     def moved(
         cls,

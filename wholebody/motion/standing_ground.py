@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from wholebody.base.files import checked_target
 from wholebody.motion.footholds import SPAN, Point, RestLimits, above_ground, lowest, resting, speeds
 from wholebody.motion.roles import ROLES, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.structure import size_of
 from wholebody.motion.surfaces import Surface, surface_of
 from wholebody.motion.windows import Window, long_runs, runs
 from wholebody.scene.scene import Scene
@@ -209,7 +210,28 @@ def ground_on(
 ) -> Ground:
     """The same on surfaces of a scene, or without one."""
     motion = checked_motion(motion, "ground: motion")
-    joints = {role: motion.names.index(name) for role, name in skeleton_roles(motion, names).items()}
+    named = skeleton_roles(motion, names)
+    size, joints = size_of(motion, named), {role: motion.names.index(name) for role, name in named.items()}
+    if size == 1.0:
+        return _ground(motion, joints, surface)
+    # speeds and heights of rests are those of people
+    found = _ground(motion.resized(1.0 / size), joints, None if surface is None else _resized(surface, size))
+    holds = [with_values(each, place=size * each.place, height=size * each.height) for each in found.footholds]
+    lows = {role: size * low for role, low in found.lowest.items()}
+    return replace(found, footholds=tuple(holds), lowest=lows, levels=tuple(size * level for level in found.levels))
+
+
+def _resized(surface: Surface, size: float) -> Surface:
+    """Surfaces of a world of which all lengths are divided by a size."""
+
+    def height(place: Array, frame: int) -> float | None:
+        found = surface(size * place, frame)
+        return None if found is None else found / size
+
+    return height
+
+
+def _ground(motion: SkeletonMotion, joints: Mapping[str, int], surface: Surface | None) -> Ground:
     feet = [f"{side}_{part}" for side in ("left", "right") for part in FEET if f"{side}_{part}" in joints]
     limits, points = RestLimits(), {role: Point(role.split("_")[0], FEET.index(role.split("_")[1])) for role in feet}
     places = motion.positions[:, [joints[role] for role in feet]]

@@ -22,6 +22,7 @@ from wholebody.motion.retargeting import checked_ground, same_figure
 from wholebody.motion.roles import matched, skeleton_roles
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.standing_ground import FEET, Ground
+from wholebody.motion.structure import size_of
 from wholebody.motion.surfaces import surface_of
 from wholebody.scene.scene import Scene
 
@@ -85,6 +86,7 @@ class Retargeter:
         joints = skeleton_roles(motion, names)  # also those that the figure lacks, such as toes
         self._feet = [role for role in known.lowest if role.split("_")[-1] in FEET and role in joints]
         self._joints = [motion.names.index(joints[role]) for role in self._feet]
+        self._size = size_of(motion, joints)
         self._rests: LiveRests | None = None
         if ground is None:
             known = replace(known, footholds=(), rests={role: known.rests[role] for role in self._feet})
@@ -92,7 +94,7 @@ class Retargeter:
         self._holds = Holds(points, known, self._proportions.path, motion.dt, surface)
         self._run = Run(figure, like, self._roles, motion.dt, self._holds, world.workspace())
         if ground is None:
-            lows = np.array([known.lowest[role] for role in self._feet])
+            lows = np.array([known.lowest[role] for role in self._feet]) / self._size
             self._rests = LiveRests(lows, motion.dt, self._run.every + self._run.slowing)
 
     def __repr__(self) -> str:
@@ -130,7 +132,7 @@ class Retargeter:
         found = list[Array]()
         for number, wanted in enumerate(wanted_of(self._proportions.targets(motion), self._roles)):
             if self._rests is not None:
-                begins, ends = self._rests.push(motion.positions[number, self._joints])
+                begins, ends = self._rests.push(motion.positions[number, self._joints] / self._size)
                 for foot, frame in begins:
                     self._holds.rest(self._feet[foot], frame)
                 for foot, frame in ends:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -296,6 +296,17 @@ def recognised_unit(parents: Indices, offsets: Array) -> str:
             UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / 2.2))
         )  # m, along the bones from foot to head
     return "metres" if size <= 3.0 else "centimetres" if size <= 300.0 else "millimetres"
+
+
+def size_of(motion: SkeletonMotion, joints: Mapping[str, str]) -> float:
+    """How many times as long as a grown person's the legs of a skeleton are, by joints of roles; 1 for grown people."""
+    legs = [[f"{side}_{part}" for part in LIMBS[0][:3]] for side in ("left", "right")]
+    if not {*legs[0], *legs[1]} <= joints.keys():
+        return 1.0
+    at = {role: motion.positions[:, motion.names.index(joint)] for role, joint in joints.items()}
+    bones = [at[end] - at[start] for leg in legs for start, end in pairwise(leg)]
+    size = 0.5 * sum(float(np.median(np.linalg.norm(bone, axis=1))) for bone in bones) / 0.84  # m, of a median person
+    return size if size > 0.0 and not 0.75 < size < 1.25 else 1.0
 
 
 def stands_along(motion: SkeletonMotion, axis: int) -> bool:

@@ -187,3 +187,12 @@ def test_a_written_person_who_lies_with_the_feet_at_the_origin_lies_when_read(tm
         for name in ("head_top", "left_foot"):
             there = human.placement(again.q[frame], name).translation
             assert there == pytest.approx(human.placement(lying, name).translation, abs=1e-5)
+
+
+@pytest.mark.parametrize(("step", "told"), [("1", True), ("0.05", False)])
+def test_frames_that_are_a_second_apart_are_told(step: str, told: bool, tmp_path: Path, rows: np.ndarray) -> None:
+    """Some writers leave the time of a frame at 1; speeds, and so rests, are wrong then."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read(tmp_path, text(hips(), rows, f"MOTION\nFrames: {{n}}\nFrame Time: {step}\n"))
+    assert any("its frames are 1 s apart" in str(each.message) for each in said) == told
