@@ -300,8 +300,8 @@ class RigidBodies:
         work = program.work()
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
+        state.bodies.twist[:] -= (1.0 - time / left) * ahead  # what the rest of it will add is no energy of this step
         program.settle(before.kept, work)
-        state.bodies.twist[:] -= (1.0 - time / left) * ahead  # what the rest of it will add
         by = np.flatnonzero(impulse.any(axis=1) & state.bodies.given[program.points.bodies].any(axis=1))
         record.given += self._events(program, record.time, by, np.zeros(len(by)), impulse[by])
         wrench = np.hstack([impulse, cross(program.points.point, impulse)])
