@@ -163,19 +163,31 @@ def test_a_limp_joint_beyond_a_sprung_one_falls_as_its_equations_of_motion_say(t
     assert moving.q == pytest.approx(end, abs=0.02)
 
 
-def test_joints_that_follow_others_are_refused(tmp_path: Path) -> None:
+def test_a_joint_that_follows_another_carries_its_mass_with_it(tmp_path: Path) -> None:
+    """Two rods that hang on one axis, of which the second turns three times as far as the first."""
     path = tmp_path / "twins.urdf"
-    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    joint = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    mass = '<origin xyz="0.5 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+    link = f"<inertial>{mass}</inertial>"
+    joint = '<axis xyz="0 -1 0"/><limit lower="-9" upper="9" effort="1" velocity="1"/>'
     path.write_text(
         f'<robot name="twins"><link name="a"/><link name="b">{link}</link><link name="c">{link}</link>'
-        f'<joint name="one" type="revolute"><parent link="a"/><child link="b"/>{joint}</joint>'
-        f'<joint name="two" type="revolute"><parent link="b"/><child link="c"/>{joint}<mimic joint="one"/></joint>'
-        "</robot>"
+        f'<joint name="one" type="revolute"><parent link="a"/><child link="b"/>{joint}</joint><joint name="two" '
+        f'type="revolute"><parent link="b"/><child link="c"/>{joint}<mimic joint="one" multiplier="2"/></joint></robot>'
     )
     figure = wb.load(path)
-    with pytest.raises(wb.InputError, match="two follow other joints"):
-        wb.World(wb.Scene(figure), spring=wb.Actuated(figure))
+    world = wb.World(wb.Scene(figure), spring=wb.Actuated(figure, stiffness=0.0, damping=0.0))
+
+    def rate(_: float, state: np.ndarray) -> list[float]:
+        angle, own = state[0], 1.0 + 0.25
+        return [state[1], -0.5 * 9.81 * (np.cos(angle) + 3.0 * np.cos(3.0 * angle)) / (own * (1.0 + 9.0))]
+
+    for _ in range(30):
+        world.step()
+    end = solve_ivp(rate, (0.0, 0.5), [0.0, 0.0], rtol=1e-9, atol=1e-9).y[0, -1]
+    assert abs(end) > 0.15
+    assert world.q[0] == pytest.approx(end, abs=1e-3)
+    with pytest.raises(wb.InputError, match="'two' follows 'one'; give that of 'one'"):
+        wb.Actuated(figure, stiffness={"two": 1.0})
 
 
 def test_a_figure_in_the_air_keeps_its_energy_and_momentum() -> None:
