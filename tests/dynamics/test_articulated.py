@@ -190,6 +190,39 @@ def test_a_joint_that_follows_another_carries_its_mass_with_it(tmp_path: Path) -
         wb.Actuated(figure, stiffness={"two": 1.0})
 
 
+def test_a_ball_that_hits_a_joint_that_another_follows_turns_both(tmp_path: Path) -> None:
+    """The follower is first in Pinocchio's order, so columns of the Jacobian are not those of freedoms."""
+    solid = '<mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+    ball = '<collision><origin xyz="-0.2 0 0"/><geometry><sphere radius="0.05"/></geometry></collision>'
+    links = "".join(f'<link name="{name}"><inertial>{solid}</inertial>{ball}</link>' for name in "abc")
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="9"/>'
+    way = '<parent link="a"/><child link="{}"/><origin xyz="{} 0 0"/><axis xyz="0 1 0"/>'
+    follower = (
+        f'<joint name="f" type="revolute">{way.format("b", 0.4)}{limit}<mimic joint="l" multiplier="-2"/></joint>'
+    )
+    leader = f'<joint name="l" type="revolute">{way.format("c", -0.4)}{limit}</joint>'
+    path = tmp_path / "wings.urdf"
+    path.write_text(f'<robot name="wings">{links}{follower}{leader}</robot>')
+    figure = wb.load(path, root="free")
+    material = wb.dynamics.Material("hard", others=(1.0, 0.0))
+    body = wb.Body(mass=2.0, velocity=(0.0, 0.0, -3.0), material=material)
+    scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=(-0.6, 0.0, 0.3), body=body)
+    engine = RigidBodies(scene, NO_WEIGHT, figure.neutral)
+    moving = Articulated(scene, figure.neutral, wb.Actuated(figure, stiffness=0.0, damping=0.0), engine)
+    began, energy, frames = engine.momentum(), engine.energy(), {name: scene.frame_id(name) for name in figure.segments}
+    for _ in range(12):
+        moving.advance(moving.q, DT, {}, frames)
+    row, model = np.zeros(figure.model.nv), figure.model
+    for freedom, step in enumerate(1e-6 * np.eye(model.nv)):
+        ends = (figure.placement(pin.integrate(model, figure.neutral, sign * step), "c") for sign in (1.0, -1.0))
+        row[freedom] = np.subtract(*(end.act(np.array([-0.2, 0.0, 0.0]))[2] for end in ends)) / 2e-6
+    inertia = pin.crba(model, model.createData(), figure.neutral)
+    impulse = 2.0 * 3.0 / (1.0 / 2.0 + row @ np.linalg.solve(inertia, row))
+    assert engine.twist("ball")[2] == pytest.approx(-3.0 + impulse / 2.0, abs=2e-3)
+    assert engine.momentum() + moving.momentum() == pytest.approx(began, abs=1e-9)
+    assert engine.energy() + moving.energy() == pytest.approx(energy, rel=5e-3)
+
+
 def test_a_figure_in_the_air_keeps_its_energy_and_momentum() -> None:
     figure = wb.load("hand")
     start = figure.posture("relaxed")
