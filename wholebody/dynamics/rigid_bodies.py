@@ -263,7 +263,8 @@ class RigidBodies:
         points = self._finder.points(self._near)
         program = StepProgram(state, points, self.gravity, self._joints, self._yielding, ahead)
         events, ended = program.resolve_impacts()
-        self._record(events, program, record)
+        if len(events):
+            self._record(events, program, record)
         falling = self._falling & ~self._borne
         program.read_velocities(falling)
         together = record.stops <= 0 or not ended

@@ -282,7 +282,7 @@ class World(NotCopyable):
         return moved
 
     def _put_bodies(self) -> None:
-        """Put bodies where the scene has them, if that is elsewhere since the last frame; they keep their velocities."""
+        """Put bodies where the scene has them, if the user moved them; they keep their velocities."""
         for name in self._bodies:
             if self.scene.objects[name].placement != self._placed[name]:
                 self.engine.put(name, self.scene.objects[name].placement)  # type: ignore[union-attr]
