@@ -261,7 +261,8 @@ def test_what_an_island_gained_is_taken_and_its_momentum_stays(fixed: bool) -> N
     assert energy(twist, 1.0) > began + 1e-3
     bears = np.tile([1.0, 0.0, 0.0], (len(pairs), 1))
     none = np.zeros(len(pairs), dtype=bool)
-    energy_kernel.restrain(pairs, bears, none, bodies, bodies.moving, before, fall, none.copy())
+    added = np.tile(fall, (4, 1))
+    energy_kernel.restrain(pairs, bears, none, bodies, bodies.moving, before, added, none.copy())
     assert energy(twist, 1.0) == pytest.approx(began, abs=1e-12)
     assert (twist[2:] == kept[2:]).all()
     if fixed:

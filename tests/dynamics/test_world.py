@@ -291,6 +291,18 @@ def test_a_body_that_is_put_elsewhere_wakes_and_its_weight_was_lifted_by_work() 
     assert engine.placement("ball").translation[2] == pytest.approx(place[2] + 0.5 - 0.5 * 9.81 / 60**2, abs=1e-4)
 
 
+def test_a_body_that_the_user_moves_in_the_scene_goes_on_from_there(planar_arm) -> None:
+    scene = wb.Scene(planar_arm([0.5, 0.4]))
+    scene.add(wb.Sphere(0.1), name="ball", at=(0.0, 0.0, 3.0), body=wb.Body(mass=1.0))
+    world = wb.World(scene)
+    for _ in range(3):
+        world.step()
+    scene.move("ball", at=(1.0, 0.0, 4.0))
+    frame = world.step()
+    fallen = 0.5 * 9.81 * world.dt**2 * (4**2 - 3**2)
+    assert frame.placements["ball"].translation == pytest.approx((1.0, 0.0, 4.0 - fallen), abs=1e-9)
+
+
 def test_a_ragdoll_that_squeezes_boxes_gives_them_no_energy_from_nowhere() -> None:
     scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
     for k in range(4):

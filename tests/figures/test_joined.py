@@ -68,6 +68,21 @@ def test_every_frame_is_where_it_is_alone(alone: dict[str, wb.Figure], joined: w
             assert np.abs(found.homogeneous - expected.homogeneous).max() < 1e-12, frame
 
 
+@pytest.mark.parametrize("order", [("arm", "arm", "arm"), ("arm", "anna", "arm"), ("anna", "arm", "gripper")])
+def test_pieces_are_of_the_links_that_they_are_of_alone(alone: dict[str, wb.Figure], order: tuple[str, ...]) -> None:
+    """In a scene of three, pieces of the first arm were its joints' by name, and a world of them was a KeyError."""
+    members = {f"{name}{k}": alone[name] for k, name in enumerate(order)}
+    scene = wb.Scene({name: (figure, (2.0 * k, 0.0, 0.0)) for k, (name, figure) in enumerate(members.items())})
+    expected = [
+        f"{name}/{figure.model.frames[piece.parentFrame].name}"
+        for name, figure in members.items()
+        for piece in figure.geometry.geometryObjects
+    ]
+    assert list(scene.piece_owner) == expected
+    scene.add(wb.Sphere(0.05), name="ball", at=(1.0, 5.0, 3.0), body=wb.Body(mass=0.3))
+    assert wb.World(scene).step().placements["ball"].translation[2] < 3.0
+
+
 def test_parts_are_those_of_each(alone: dict[str, wb.Figure], joined: wb.Figure) -> None:
     for name, figure in alone.items():
         mine = [joined.model.joints[k] for k in joined.bodies[f"{name}/"]]

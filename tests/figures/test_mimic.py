@@ -132,16 +132,22 @@ def test_it_is_solved_swept_tracked_reduced_and_judged(load: Callable[..., wb.Fi
     pin.framesForwardKinematics(figure.model, data, goal_q)
     goals = [wb.Point(link, data.oMf[figure.frame_id(link)].translation.copy()) for link in ("c", "e")]
     problem = wb.Problem(scene, goals=goals)
-    for method in ("qp", "dls"):
+    for method in ("qp", "dls", "newton"):
         solution = wb.solve(problem, method=method)
         assert solution.solved, (method, solution)
         assert solution.q[0] == pytest.approx(goal_q[0], abs=1e-3)
     assert scene.sweep(figure.neutral, goal_q) is None
     assert figure.reduced("own").joints == ("own",)
     assert figure.reduced("z_leader").joints == ("a_finger", "b_slider", "z_leader")
-    for method in (name for name in installed_methods() if name not in ("qp", "dls")):
-        with pytest.raises(wb.WholebodyError, match=r"(?i)mimic"):
-            wb.solve(problem, method=method)
+    bent = scene.state(figure.with_joints(figure.neutral, {"own": -0.4})).frame(figure.frame_id("e")).translation
+    alone = wb.solve(wb.Problem(scene, goals=[wb.Point("e", bent)]), method="ccd")
+    assert alone.solved
+    assert alone.q[0] == figure.neutral[0]
+    with pytest.raises(wb.WholebodyError, match=r"joints that others follow stay"):
+        wb.solve(problem, method="ccd")
+    if "placo" in installed_methods():
+        with pytest.raises(wb.WholebodyError, match="mimics another with an offset"):
+            wb.solve(problem, method="placo")
 
 
 def test_placo_couples_followers_by_gears(load: Callable[..., wb.Figure]) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, cross, with_values
-from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, some, time_step
+from wholebody.base.checks import TIME_STEP, a, instance, known, number, posture, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range
 from wholebody.dynamics import impulse_kernel
@@ -227,16 +227,15 @@ class Actuated:
         names = {**roots, **figure.groups, **{name: [name] for name in figure.joints}}
         for name, value in gains.items():
             size = number(value, f"{what}[{name!r}]", 0.0, MOST)
+            if (law := figure.followers.get(name)) is not None:
+                raise InputError(f"{what}: {name!r} follows {law.joint!r}; give that of {law.joint!r}")
             for joint in names[known(name, names, "joint or group", what)]:
                 moved = model.joints[model.getJointId(joint)]
                 found[moved.idx_v : moved.idx_v + moved.nv] = size
         return found
 
     def check(self, model: pin.Model) -> None:
-        """Raise InputError for a scene with another model, and for joints that follow others."""
-        if self.figure.followers:
-            names = some(self.figure.followers)
-            raise InputError(f"Actuated: {names} follow other joints and cannot yield; make them joints of their own")
+        """Raise InputError for a scene with another model."""
         if list(model.names) != list(self.figure.model.names):
             raise InputError(f"Actuated: the scene is not one of {a(self.figure.name)}; give scene.figure")
 

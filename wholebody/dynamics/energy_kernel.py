@@ -90,7 +90,7 @@ def restrain(
 
     Islands with joints, and those that something moved pushes, are settled after they have moved: see `settle`.
     `points` (m, 2) and `impulse` (m, 3) are of all points, joints last; `off` (k,) contact points whose rates the
-    program did not reach; `movable` (n,) what it moves; `before` (n, 6) velocities; `fall` (3,) gravity times the time,
+    program did not reach; `movable` (n,) what it moves; `before` (n, 6) velocities; `fall` (n, 3) what weight added,
     m/s; `jammed` (k,) room for contact points that bear something of pushed islands where a rate is off.
     """
     root, kind, pushed = _islands(points, impulse, len(off), bodies, movable)
@@ -104,7 +104,7 @@ def restrain(
         if pushed[b] and kind[root[b]] != DRIVEN:
             lifted = 0.0
             for k in range(3):
-                lifted -= bodies.mass[b] * fall[k] * twist[b, k]
+                lifted -= bodies.mass[b] * fall[b, k] * twist[b, k]
             after = _kinetic(b, bodies, bodies.rotation[b], twist[b], turning)
             gain[root[b]] += after + lifted - _kinetic(b, bodies, bodies.rotation[b], before[b], turning)
     inside = np.empty(count, dtype=np.bool_)
@@ -143,7 +143,7 @@ def settle(
             gain[root[b]] -= _kinetic(b, bodies, rotation[b], twist[b], turning)
             for k in range(3):
                 gain[root[b]] -= bodies.mass[b] * gravity[k] * (bodies.position[b, k] - position[b, k])
-    still, inside = np.zeros(3), np.empty(count, dtype=np.bool_)
+    still, inside = np.zeros((count, 3)), np.empty(count, dtype=np.bool_)
     for island in range(count):
         keeps = linked[island] and not touched[island]
         if keeps or (gain[island] > 0.0 and (linked[island] or kind[island] == DRIVEN)):
@@ -187,7 +187,7 @@ def _take(inside: Mask, free: bool, excess: float, most: float, bodies: Bodies, 
         _seen(b, bodies, centre, whole, own)
         square += _kinetic(b, bodies, bodies.rotation[b], own, turning)
         for k in range(3):
-            linear -= bodies.mass[b] * fall[k] * own[k]
+            linear -= bodies.mass[b] * fall[b, k] * own[k]
     rest = excess - square - linear  # s^2 square + s linear + rest is to be zero, and is `excess` for s = 1
     share, root_of = 0.0, linear * linear - 4.0 * square * rest
     if square > 0.0 and root_of > 0.0:

@@ -263,7 +263,8 @@ class RigidBodies:
         points = self._finder.points(self._near)
         program = StepProgram(state, points, self.gravity, self._joints, self._yielding, ahead)
         events, ended = program.resolve_impacts()
-        self._record(events, program, record)
+        if len(events):
+            self._record(events, program, record)
         falling = self._falling & ~self._borne
         program.read_velocities(falling)
         together = record.stops <= 0 or not ended
@@ -300,8 +301,8 @@ class RigidBodies:
         work = program.work()
         record.work += float(work.sum())
         self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
+        state.bodies.twist[:] -= (1.0 - time / left) * ahead  # what the rest of it will add is no energy of this step
         program.settle(before.kept, work)
-        state.bodies.twist[:] -= (1.0 - time / left) * ahead  # what the rest of it will add
         by = np.flatnonzero(impulse.any(axis=1) & state.bodies.given[program.points.bodies].any(axis=1))
         record.given += self._events(program, record.time, by, np.zeros(len(by)), impulse[by])
         wrench = np.hstack([impulse, cross(program.points.point, impulse)])

@@ -170,7 +170,8 @@ class StepProgram:
         began = twist.copy()
         # what is held has all of its fall at once: it does not rise in a step that ends early
         held = self._ahead[:, :3]
-        state.velocity[moving] += np.where((held != 0.0).any(axis=1, keepdims=True), held, time * self.gravity)[moving]
+        fall = np.where((held != 0.0).any(axis=1, keepdims=True), held, time * self.gravity)
+        state.velocity[moving] += fall[moving]
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
@@ -183,20 +184,19 @@ class StepProgram:
                 rates = self._rates(0.5 * (before + twist))
                 rates[len(target) :] -= 0.5 * hold  # what closes joints is no work
                 if float((rates * self.impulse).sum()) <= 0.0:
-                    self._restrain(began, time, target)
+                    self._restrain(began, fall, target)
                     return
                 twist[:] = before
         else:  # bodies that nothing bears move with the mean of both velocities, and rounding is to bear none
             target = np.where(ends, target + 0.5 * np.minimum(self._pull, 0.0) * time - 1e-9, target)
         self._solve(target, start, hold)
-        self._restrain(began, time, target)
+        self._restrain(began, fall, target)
 
-    def _restrain(self, began: Array, time: float, target: Array) -> None:
-        """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
+    def _restrain(self, began: Array, fall: Array, target: Array) -> None:
+        """Take away what the tolerance of the program added to the energy; arguments as of `energy_kernel.restrain`."""
         bodies, points = self.state.bodies, self._rows.bodies
         off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > 1.2e-4  # m/s: a program is solved to 1e-4
-        fall, movable = time * self.gravity, self._rows.movable
-        energy_kernel.restrain(points, self.impulse, off, bodies, movable, began, fall, self._jammed)
+        energy_kernel.restrain(points, self.impulse, off, bodies, self._rows.movable, began, fall, self._jammed)
 
     def work(self) -> Array:
         """Work that bodies whose motion is given did at each point (m + j,) by the impulses of the program, joules."""
@@ -292,7 +292,7 @@ def compiled_kernel(_: Any) -> None:
     solve_kernel.residuals(rows, laws, twist, vectors)
     solve_kernel.join(none, pairs, mask, _integers(1))
     solve_kernel.solve_from((none, vectors, vectors), (none, vectors), rows, laws, twist, vectors, Limits(1.0, 1))
-    energy_kernel.restrain(pairs, vectors, no_mask, bodies, mask, twist, np.zeros(3), no_mask)
+    energy_kernel.restrain(pairs, vectors, no_mask, bodies, mask, twist, one, no_mask)
     energy_kernel.settle(pairs, vectors, some, 0, bodies, mask, (one, unit, twist), np.zeros(3))
     impact_kernel.resolve(none, none, rows, some, laws, mask, twist, np.zeros((1, 5)))
     swept = SweptPoints(vectors, none, none, some, vectors, np.zeros((0, 4)))

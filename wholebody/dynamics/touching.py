@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Indices, Mask, cross
+from wholebody.base.arrays import Array, Indices, Mask, cross, with_values
 from wholebody.dynamics import impulse_kernel
 from wholebody.dynamics.coupling import Moved, Points, approaches
 from wholebody.dynamics.frame import EngineFrame, Given
@@ -83,7 +83,9 @@ class Touching:
             normal, place = np.concatenate([normal, others.normal]), np.concatenate([place, others.point])
             pair = np.concatenate([pair, len(workspace.table.pairs) + others.pair])
         bodies = np.unique(owner[owner < free])
-        made = Points.room(len(owner), model.nv, [self._names[k] for k in bodies.tolist()], engine)
+        made = Points.room(
+            len(owner), workspace.state.jacobian.shape[1], [self._names[k] for k in bodies.tolist()], engine
+        )
         made.place[:], made.gap[:] = place, gap
         made.restitution[:], made.friction[:] = self._surfaces(owner)
         made.pair[:] = 2 * model.nv + pair  # after the limits
@@ -95,6 +97,7 @@ class Touching:
             (normal, place, owner), (sides, state.support, np.ascontiguousarray(state.jacobian)),
             (slot, centres, twists), (made.axes, made.figure, made.things, made.given, made.driven),
         )  # fmt: skip
+        made = with_values(made, figure=state.folded(made.figure))  # joints that follow others move with them
         made.add_flesh(state, workspace.geometry, self._flesh, near.pair[contact])
         return self.limits(made, q, 0.02 + 1.5 * time * np.abs(velocity))
 

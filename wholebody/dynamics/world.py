@@ -81,8 +81,9 @@ class WorldFrame(NamedTuple):
 class World(NotCopyable):
     """A figure that follows a tracker among things, some of which move by themselves.
 
-    Things without a `wb.Body` are fixed; the user may move them between frames (`Scene.move` with `over=world.dt`). The
-    scene always has the present placements of all things.
+    Things without a `wb.Body` are fixed; the user may move them between frames (`Scene.move` with `over=world.dt`), and
+    put bodies elsewhere, which keep their velocities. The scene has the present placements of all things, so each world
+    needs a scene of its own, such as `copy.copy(scene)`.
 
     Attributes:
         scene: figure and things.
@@ -209,6 +210,7 @@ class World(NotCopyable):
             note = invalid_reason(self.scene, goal)
             self._tracked = self._tracked if note else np.array(pin.normalize(self.scene.model, goal))
         moved = self._user_moves()
+        self._put_bodies()
         advance = self._advance if self._articulated is None else self._yield
         wanted, frame, impulses, engine = advance(moved)
         if self.engine is not None:
@@ -237,9 +239,7 @@ class World(NotCopyable):
         frame = self._loop.frame(wanted)
         impulses, engine = dict[str, Array](), None
         if self.engine is not None:
-            for name in self._bodies if self.give_way == "both" else ():
-                if self.scene.objects[name].placement != self._placed[name]:
-                    self.engine.put(name, self.scene.objects[name].placement)
+            self._put_bodies()  # those that gave way
             impulses = self._push(frame.q)
             after = self._segments(frame.q)
             given = {name: (self._before[name], place) for name, place in after.items()}
@@ -280,6 +280,13 @@ class World(NotCopyable):
             if thing.body is None and thing.placement != before:
                 moved[name] = (thing.placement if thing.motion is None else before, thing.placement)
         return moved
+
+    def _put_bodies(self) -> None:
+        """Put bodies where the scene has them, if the user moved them; they keep their velocities."""
+        for name in self._bodies:
+            if self.scene.objects[name].placement != self._placed[name]:
+                self.engine.put(name, self.scene.objects[name].placement)  # type: ignore[union-attr]
+                self._placed[name] = self.scene.objects[name].placement
 
     def _squeezed(self, near: Contacts, moving: Collection[str]) -> tuple[Collision, ...]:
         """Things in each other, of which one moves by itself or was moved, the deepest first; `near` has pairs."""

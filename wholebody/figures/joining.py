@@ -62,6 +62,8 @@ def joined_parts(members: Mapping[str, Member]) -> Parts:
     for name, (figure, at) in members.items():
         model, part = _with(model, figure, f"{name}/", 0, pin.SE3.Identity() if figure.roots else at)
         parts.append(part)
+    # Pinocchio gives links other numbers where the next model is appended
+    parts = [with_values(part, frames=_frames(model, part.figure, part.prefix, 0)) for part in parts]
     between = [_between(parts, first, second) for second in range(len(parts)) for first in range(second)]
     description = with_values(
         _merged(parts), postures=_postures(members), members=members, prefixes=tuple(part.prefix for part in parts)
@@ -139,10 +141,16 @@ def _with(model: pin.Model, figure: Articulated, prefix: str, frame: int, at: pi
         made.inertias[joints[k]] = own.inertias[k]
     seated = made.getJointId(model.names[carrier])
     made.inertias[seated] = model.inertias[carrier] + world.act(own.inertias[0])
-    frames = (frame, *(made.getFrameId(one.name, one.type) for one in list(own.frames)[1:]))
     for one in made.frames:
         one.name = one.name.removesuffix(OF_LINK)
+    frames = _frames(made, figure, prefix, frame)
     return made, _Part(figure, (seated, *joints[1:]), frames, world, prefix, seat.name, at.rotation)
+
+
+def _frames(model: pin.Model, figure: Articulated, prefix: str, first: int) -> tuple[int, ...]:
+    """Index in the model of each frame of a figure, `first` of its world."""
+    own = list(figure.model.frames)[1:]
+    return (first, *(model.getFrameId(prefix + one.name, one.type) for one in own))
 
 
 def _geometry(parts: Sequence[_Part], between: Sequence[Indices]) -> pin.GeometryModel:

@@ -138,9 +138,26 @@ def test_wrong_measures_are_named() -> None:
     made = wb.Assembly().body("bar")
     with pytest.raises(wb.InputError, match="correct the gradient"):
         made.minimise(Near("bar", (1, 0, 0), (0, 0, 1), slope=1.0))
-    with pytest.raises(wb.InputError, match="a class of your own"):
+    with pytest.raises(wb.InputError, match="name the figure: there is none"):
         made.minimise(wb.Effort())
     with pytest.raises(wb.InputError, match="nearest"):
         made.minimise(Near("bar", (1, 0, 0), (0, 0, 1))).solve(nearest=True)
     with pytest.raises(wb.InputError, match="metric"):
         wb.Assembly(metric="eq1")  # type: ignore[arg-type]
+
+
+def test_a_person_holds_a_box_where_a_measure_of_her_own_is_least() -> None:
+    human = wb.load("human")
+    made = wb.Assembly().body("box", (0.5, 0.0, 1.0)).figure("ann", human, constraints=[wb.Hold("left_foot")])
+    with pytest.raises(wb.UnknownNameError, match="called 'ben'"):
+        made.minimise(wb.tasks.Hang(), figure="ben")
+    for palm, side in (("ann/left_palm", 0.1), ("ann/right_palm", -0.1)):
+        made.spherical("box", palm, at_first=(0.0, side, 0.0), at_second=(0.0, 0.0, 0.0))
+    assert made.solve().status == "solved"
+    measure, scene = wb.tasks.Discomfort(), wb.Scene(human)
+    stated = wb.Problem(scene, made.posture("ann"), measures=[measure], balance=False).measures[0]
+    before = stated.value(scene.state(made.posture("ann")))
+    assert made.minimise(measure).solve().status == "solved"
+    assert stated.value(scene.state(made.posture("ann"))) < 0.01 * before
+    ends = [made.placement(name).translation for name in ("ann/left_palm", "ann/right_palm")]
+    assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(0.2, abs=2e-5)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
@@ -78,7 +77,9 @@ class _Reader:
         self.joints: set[int] = set()
         self._closed: set[int] = set()  # identities of holds that are met as goals
         names = (bound.joints for bound in problem.bounds if isinstance(bound, Freeze))
-        self.fixed = {self._figure.joint_id(name) for joints in names for name in self._figure.joint_names(joints)}
+        leaders = {law.joint for law in self._figure.followers.values()}  # one that others follow (mimic) stays
+        frozen = (name for joints in names for name in self._figure.joint_names(joints))
+        self.fixed = {self._figure.joint_id(name) for name in (*leaders, *frozen)}
 
     def goals(self) -> tuple[GoalPlace, ...]:
         """The goals; their joints are among `joints` then."""
@@ -103,7 +104,9 @@ class _Reader:
     def _move(self, where: str, frame: str, joints: Iterable[int]) -> None:
         path = [joint for joint in joints if joint not in self.fixed]
         if not path:
-            self.refused.append(f"{where}({frame!r}), which no joint moves that may turn (the root stays)")
+            self.refused.append(
+                f"{where}({frame!r}), which no joint moves that may turn (the root and joints that others follow stay)"
+            )
         self.joints.update(path)
 
     def loops(self) -> tuple[GoalPlace, ...]:
@@ -165,15 +168,13 @@ class _Reader:
         return np.asarray(support[term.residual.place.joint] - support[term.residual.base.joint])
 
     def others(self) -> None:
-        """Refuse bounds, measures and joints without a counterpart in cyclic coordinate descent."""
+        """Refuse bounds and measures without a counterpart in cyclic coordinate descent."""
         for number, bound in enumerate(self._problem.bounds):
             if not isinstance(bound, (Freeze, StepLimit)):
                 self.refused.append(f"bounds[{number}], {type(bound).__name__}")
         if self._problem.measures_given:
             for number, term in enumerate(self._problem.measures):
                 self.refused.append(f"measures[{number}], {type(term).__name__}")
-        for name in list(followers_of(self._figure.model))[:1]:
-            self.refused.append(f"joint {name!r}, which follows another one (mimic)")
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:

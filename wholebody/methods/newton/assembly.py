@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
-from wholebody.base.checks import choice, flag, known, number, shown, some, whole
+from wholebody.base.checks import choice, flag, instance, known, number, shown, some, whole
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
@@ -24,6 +24,7 @@ from wholebody.methods.newton.assembly_system import (
     AssemblySolution,
     AssemblyStep,
     AssemblySystem,
+    OfFigure,
     checked,
     explained,
     to_target,
@@ -39,6 +40,7 @@ from wholebody.methods.newton.settings import CONTACTS, FRAMES
 from wholebody.methods.newton.system import System
 from wholebody.scene.moving_obstacles import FrameMotion
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Measure
 from wholebody.tasks.inputs import point
 
@@ -166,12 +168,26 @@ class Assembly(AssemblyJoints):
 
     # ---- measures
 
-    def minimise(self, measure: Measure) -> Self:
-        """Lower a measure of a class of your own, in solves and frames, as far as joints, goals and contacts let it.
+    def minimise(self, measure: Measure, figure: str | None = None) -> Self:
+        """Lower a measure, in solves and frames, as far as joints, goals and contacts let it.
 
-        It is asked at states of the assembly's `scene`, where joint ``scene.model.getJointId("rod")`` carries the body
-        "rod". Its gradient is compared with a finite difference.
+        One of a class of your own is asked at states of the assembly's `scene`, where joint
+        ``scene.model.getJointId("rod")`` carries the body "rod". Its gradient is compared with a finite difference.
+
+        Args:
+            measure: of a class of your own, or such as `wb.tasks.Discomfort()` of a figure.
+            figure: whose joints a measure of this package is of; it may be left out where there is one figure.
         """
+        own = is_own(instance(measure, Measure, "minimise: measure", "give an object of a subclass of wb.Measure"))
+        if figure is None and len(self._figures) == 1 and not own:
+            (figure,) = self._figures
+        if figure is not None:
+            measure = OfFigure(measure, self._figures[known(figure, self._figures, "figure", "minimise")])
+        elif not own:
+            known_ones = some(self._figures) or "there is none"
+            raise InputError(
+                f"minimise: {type(measure).__name__} is of a figure's joints; name the figure: {known_ones}"
+            )
         self._measures.append(checked(measure, self.scene, self.q))
         return self._changed()
 

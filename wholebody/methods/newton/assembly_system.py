@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, brief
-from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
+from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_geometry import AssemblyFigure
@@ -208,12 +208,42 @@ class AssemblySystem(ActiveSystem):
             joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
 
 
+class OfFigure(Measure):
+    """A measure of one figure's joints, at states of the scene of the assembly that the figure is in."""
+
+    def __init__(self, measure: Measure, figure: AssemblyFigure) -> None:
+        """Resolve the measure on the figure alone."""
+        problem = figure.problem
+        self._measure, self._state = measure.resolve(problem.scene, problem.start), State(figure.model)
+        self._first = f"{figure.name}/{figure.names[0]}"
+
+    @property
+    def weight(self) -> float:  # noqa: D102
+        return self._measure.weight
+
+    def _alone(self, state: State) -> State:
+        first = state.model.joints[state.model.getJointId(self._first)].idx_q
+        return self._state.update(state.q[first : first + self._state.model.nq])
+
+    def _among(self, own: Array, state: State) -> Array:
+        """Numbers (nv,) of the figure's freedoms among those of all, which are 0."""
+        result, first = np.zeros(state.model.nv), state.model.joints[state.model.getJointId(self._first)].idx_v
+        result[first : first + len(own)] = own
+        return result
+
+    def value(self, state: State) -> float:  # noqa: D102
+        return self._measure.value(self._alone(state))
+
+    def gradient(self, state: State) -> Array:  # noqa: D102
+        return self._among(self._measure.gradient(self._alone(state)), state)
+
+    def curvature(self, state: State) -> Array:  # noqa: D102
+        return self._among(self._measure.curvature(self._alone(state)), state)
+
+
 def checked(measure: Measure, scene: Scene, q: Array) -> Measure:
-    """A measure of one's own whose gradient agrees with a central difference at a posture (nq,) of a scene."""
-    instance(measure, Measure, "minimise: measure", "give an object of a subclass of wb.Measure")
+    """A measure whose gradient agrees with a central difference at a posture (nq,) of a scene."""
     label = type(measure).__name__
-    if not is_own(measure):
-        raise InputError(f"minimise: {label} is of one figure's joints; give a measure of a class of your own")
     resolved, state = measure.resolve(scene, q), scene.state(q)
     check_measure("minimise", resolved, state)
     way = np.random.default_rng(0).normal(size=scene.model.nv)

@@ -10,13 +10,14 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, cross
+from wholebody.figures.description import Follower, follows
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
 from wholebody.geometry.placement import quaternions
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.batches import OBJECTIVE, ONE_SIDED, Angle, Batch, EquationSet, with_world
+from wholebody.methods.newton.batches import HARD, OBJECTIVE, ONE_SIDED, Angle, Batch, EquationSet, Slide, with_world
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
 
@@ -34,6 +35,8 @@ class Chart:
         self._axes = np.zeros((2, model.nv, 3))  # translation, rotation
         for joint in range(1, model.njoints):
             kind, parent = model.joints[joint], int(model.parents[joint])
+            if not kind.nv:  # it follows another joint
+                continue
             place = slice(kind.idx_v, kind.idx_v + kind.nv)
             self._ends[:, place] = [[first + joint - 1], [first + parent - 1 if parent else -1]]
             self._axes[:, place] = np.array(kind.createData().S).reshape(2, 3, -1).transpose(0, 2, 1)
@@ -88,6 +91,33 @@ class DisplacementRows(Batch):
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         return self._chart.rows(x)[None]
+
+
+class Following(Batch):
+    """A joint whose value is that of another times a slope plus an offset: one row of all bodies of a figure."""
+
+    size = 1
+
+    def __init__(self, bodies: Indices, label: str, values: tuple[Batch, Batch], law: Follower) -> None:
+        """Take the bodies (n,), of which the first is Pinocchio's joint 1, and what tells the values of both joints."""
+        super().__init__(bodies[None], [label])
+        self._values, self._law = values, law
+        columns = [(7 * (value.bodies - bodies[0])[0, :, None] + np.arange(7)).ravel() for value in values]
+        self._kept = [(np.flatnonzero(column >= 0), column[column >= 0]) for column in columns]
+        self.pattern = np.zeros((1, 7 * len(bodies)), dtype=bool)
+        for value, (kept, column) in zip(values, self._kept, strict=True):
+            self.pattern[0, column] |= value.pattern[0, kept]
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        own, other = (value.residual(x) for value in self._values)
+        return np.asarray(own - self._law.slope * other - self._law.offset)
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        result = np.zeros((1, 1, self.pattern.shape[1]))
+        parts = zip(self._values, self._kept, (1.0, -self._law.slope), strict=True)
+        for value, (kept, column), sign in parts:
+            result[0, 0, column] += sign * value.jacobian(x)[0, 0, kept]
+        return result
 
 
 class FigureBodies:
@@ -248,6 +278,9 @@ class FigureBodies:
         model, equations = self.model, self.equations
         kind, parent, placement = model.joints[joint], int(model.parents[joint]), model.jointPlacements[joint]
         name, label = kind.shortname(), f"the joint {model.names[joint]!r}"
+        if follows(kind):
+            self._add_follower(joint)
+            return
         a, b = self.index(parent), self.index(joint)
         place, turn = np.array(placement.translation), pin.Quaternion(placement.rotation)
         if name == "JointModelFreeFlyer":
@@ -279,6 +312,40 @@ class FigureBodies:
         else:
             raise UnsupportedTermError("newton", [f"{label}, a {name} (figure.reduced can lock it)"])
 
+    def _add_follower(self, joint: int) -> None:
+        """The equations of a joint that follows another: those of its kind, and its value by that of the other."""
+        model, label = self.model, f"the joint {self.model.names[joint]!r}"
+        law = self.figure.followers[model.names[joint]]
+        values = self._value(joint), self._value(model.getJointId(law.joint))
+        a, b = self.index(int(model.parents[joint])), self.index(joint)
+        placement, axis = model.jointPlacements[joint], _axis(model.joints[joint])
+        turn, basis = pin.Quaternion(placement.rotation), pin.Quaternion(axes_with_z(axis[None])[0])
+        if isinstance(values[0], Angle):
+            self.equations.coincide(a, b, label, np.array(placement.translation), np.zeros(3))
+        else:
+            sides = (turn * basis).toRotationMatrix().T[:2]
+            self.equations.slide(a, b, label, sides, np.zeros(3), sides @ placement.translation)
+        self.equations.turn(a, b, label, turn * basis, basis, 2 if isinstance(values[0], Angle) else 3)
+        self.equations.add(Following(self.first + np.arange(self.count), label, values, law), HARD)
+
+    def _value(self, joint: int) -> Batch:
+        """The row that is the value of a joint that turns about one axis, or slides along one."""
+        model, label = self.model, f"the joint {self.model.names[joint]!r}"
+        bodies = np.array([[self.index(int(model.parents[joint])), self.index(joint)]])
+        placement, (slide, turn) = model.jointPlacements[joint], _screw(model.joints[joint]).reshape(2, 3)
+        if slide.any():
+            along = placement.rotation @ slide
+            return Slide(
+                bodies, [label], along[None, None], np.zeros((1, 3)), np.array([[along @ placement.translation]])
+            )
+        basis = pin.Quaternion(axes_with_z(turn[None])[0])
+        ends = ((pin.Quaternion(placement.rotation) * basis).coeffs()[None], basis.coeffs()[None])
+        law, index = self.figure.followers.get(model.names[joint]), model.joints[joint].idx_q
+        middle = 0.5 * (model.lowerPositionLimit[index] + model.upperPositionLimit[index])
+        middle = middle if np.isfinite(middle) else 0.0
+        middle = middle if law is None else law.slope * middle + law.offset
+        return Angle(bodies, [label], relative_forms(*ends)[:, 2:], np.array([middle]), np.zeros(1), np.ones(1))
+
     def _weight(self) -> Array:
         """Weights: a rotation of a body counts as the motion of its farthest point."""
         size = np.full(self.count, 0.1)  # m: of a body without pieces; smaller = its rotations have less weight
@@ -295,9 +362,14 @@ class FigureBodies:
         return result.ravel()
 
 
+def _screw(kind: Any) -> Array:
+    """The motion (6,) of a joint of one degree of freedom at unit speed; Pinocchio gives that of a leader's."""
+    return np.array(kind.createData().S).ravel() / (kind.extract().scaling if follows(kind) else 1.0)
+
+
 def _axis(kind: Any) -> Array:
     """Unit axis (3,) of a joint that slides along one or turns about one."""
-    slide, turn = np.array(kind.createData().S).reshape(2, 3)
+    slide, turn = _screw(kind).reshape(2, 3)
     return slide if slide.any() else turn
 
 

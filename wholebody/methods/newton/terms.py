@@ -100,7 +100,8 @@ def _frozen(equations: EquationSet, bodies: FigureBodies, bound: tasks.Freeze, s
     """Joints that keep their placement relative to their parent at a state."""
     figure, model = bodies.figure, bodies.model
     for name in figure.joint_names(bound.joints):
-        joint = figure.joint_id(name)
+        law = figure.followers.get(name)  # one that follows is frozen by the one that leads it
+        joint = figure.joint_id(name if law is None else law.joint)
         parent = int(model.parents[joint])
         here = state.data.oMi[parent].actInv(state.data.oMi[joint])
         a, b, label = bodies.index(parent), bodies.index(joint), f"Freeze, {name!r}"
