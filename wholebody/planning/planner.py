@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.assessment.posture import assess
+from wholebody.assessment.posture import assess, violations
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.compiled import compile_all, compile_seconds
@@ -39,6 +39,7 @@ from wholebody.tasks.bounds import Freeze, StepLimit
 
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
+TOGETHER = 16  # frames that are judged at once: more = cheaper each, later at the end
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
@@ -262,12 +263,15 @@ class _Judge:
     def __init__(self, problem: Problem, pace: Pace) -> None:
         self.problem, self._pace = problem, pace
         self.took = 0.0  # s: that a path took from here to its judgement
-        spent = []
+        scene, spent = problem.scene, list[float]()
+        self._sweep = Sweep(scene.model, scene.geometry, scene.pair_table)
+        beside = np.asarray(pin.integrate(scene.model, problem.start, np.full(scene.model.nv, 1e-3)))
         for _ in range(3):  # the least, as a busy machine takes several times as long now and then
             began = _computed()
-            assess(problem, problem.start)
+            violations(problem, np.array([problem.start] * 4))
+            self._sweep.first_contact(problem.start, beside)
             spent.append(_computed() - began)
-        self._frame = 3.0 * min(spent)  # s: each is also swept from the one before
+        self._frame = min(spent)  # s: of a frame that is near more things, and of the sweep to the next one
 
     def in_time(self, path: list[Array], share: float = 1.0, least: float = 0.2) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
@@ -286,11 +290,10 @@ class _Judge:
         q = np.concatenate([Timing(scene.figure, part, pace, own).within(local.corrected) for part in parts])
         use = used(scene.figure, q, pace, own)
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
-        for frame in q:  # as far as the first that misses something
+        for first in range(0, len(q), TOGETHER):  # as far as the first that misses something
             if not worst <= KEPT or BUDGET.over:
                 break
-            one = assess(asked, frame)
-            worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
+            worst = max(worst, float(violations(asked, q[first : first + TOGETHER]).max()))
         faults = [
             f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
             f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
@@ -299,7 +302,7 @@ class _Judge:
         ]
         late = BUDGET.over
         if not (late or any(faults)):
-            sweep = Sweep(scene.model, scene.geometry, scene.pair_table)
+            sweep = self._sweep
             free = (not BUDGET.over and sweep.first_contact(*pair, tolerance=PASSED) is None for pair in pairwise(q))
             passed = next((k for k, kept in enumerate(free, 1) if not kept), 0)
             faults.append(f"something is passed through before frame {passed}" if passed else "")
