@@ -34,7 +34,8 @@ from wholebody.planning.timing import Pace, Timing, least_time, used
 from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks.base import Bound, Constraint, Goal
+from wholebody.solution import Solution
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import Freeze, StepLimit
 
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
@@ -92,7 +93,7 @@ class Plan:
 def plan(
     scene: Scene,
     start: Array | str | None,
-    goal: Array | str | Goal | Iterable[Goal],
+    goal: Array | str | Goal | Solution | Sequence[Array | str | Solution] | Iterable[Goal],
     *,
     constraints: Iterable[Constraint | Bound] = (),
     clearance: float = 0.0,
@@ -109,7 +110,8 @@ def plan(
     Args:
         scene: the figure among things.
         start: (nq,) posture at which the motion begins, the name of one, or None for the figure's first posture.
-        goal: (nq,) posture at which it ends, the name of one, or goals that its end meets.
+        goal: (nq,) posture at which it ends, the name of one, several such as those of `wb.solutions`, at one
+            of which it ends, or goals that its end meets.
         constraints: what holds throughout, such as `wb.Hold("left_foot")`, as in a `wb.Problem`.
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
@@ -138,9 +140,9 @@ def plan(
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         if any(isinstance(bound, StepLimit) for bound in problem.bounds):
             raise InputError("plan: a StepLimit bounds no plan; give pace=wb.planning.Pace(velocity=1.0)")
-        _check_end(problem, problem.start, "start")
+        _check_end(problem, problem.start, "the start")
         sampler = Sampler(problem, rng)
-        ends = answers(problem, sampler) if goals else iter([(_posture(problem, goal), "")])
+        ends = answers(problem, sampler) if goals else iter([(q, "") for q in _postures(problem, goal)])
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
@@ -169,6 +171,11 @@ def _goals(goal: Any) -> tuple[Goal, ...]:
     """The goals, where these are given; none for a posture."""
     if isinstance(goal, Goal):
         return (goal,)
+    measures = [one for one in (goal if isinstance(goal, (list, tuple)) else [goal]) if isinstance(one, Measure)]
+    if measures:
+        raise InputError(
+            f"plan: goal has {checks.a(type(measures[0]))}, and a plan takes no measures; give a posture of wb.solve"
+        )
     if isinstance(goal, (str, np.ndarray)) or not isinstance(goal, Iterable):
         return ()
     listed = tuple(goal)
@@ -177,11 +184,18 @@ def _goals(goal: Any) -> tuple[Goal, ...]:
     return listed if any(isinstance(one, Goal) for one in listed) else ()
 
 
-def _posture(problem: Problem, goal: Any) -> Array:
-    figure = problem.scene.figure
-    q = figure.posture(goal) if isinstance(goal, str) else checks.posture(goal, figure.model.nq, "plan: goal")
-    _check_end(problem, q, "goal")
-    return np.array(q, dtype=float)
+def _postures(problem: Problem, goal: Any) -> list[Array]:
+    """The postures (nq,) at which the motion may end, the nearest to the start first."""
+    figure, model, found = problem.scene.figure, problem.scene.model, list[Array]()
+    listed = isinstance(goal, Sequence) or (isinstance(goal, np.ndarray) and goal.ndim > 0)
+    first = goal[0] if listed and len(goal) and not isinstance(goal, str) else 0.0
+    several = np.ndim(first) > 0 or isinstance(first, (str, Solution))
+    for k, one in enumerate(goal if several else [goal]):
+        q = one.q if isinstance(one, Solution) else figure.posture(one) if isinstance(one, str) else one
+        what = f"goal[{k}]" if several else "the goal"
+        found.append(np.array(checks.posture(q, figure.model.nq, f"plan: {what}"), dtype=float))
+        _check_end(problem, found[-1], what)
+    return sorted(found, key=lambda q: float(np.linalg.norm(pin.difference(model, problem.start, q))))
 
 
 def _check_end(problem: Problem, q: Array, what: str) -> None:
@@ -192,23 +206,23 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
         most = int(np.argmax(np.maximum(limits.lower - here, here - limits.upper)))
         joint = scene.model.names[joint_of(scene.model, int(limits.idx_v[most]))]
         raise InputError(
-            f"plan: at the {what} {joint} is {here[most]:.4g}, beyond its limits {limits.lower[most]:.4g} and "
+            f"plan: at {what} {joint} is {here[most]:.4g}, beyond its limits {limits.lower[most]:.4g} and "
             f"{limits.upper[most]:.4g}; give figure.clamp(q) for the nearest posture within limits"
         )
     if not judged.penetration <= KEPT:
         deepest = [scene.piece_owner[piece] for piece in scene.contacts(q, 0.0).pair[:1].ravel().tolist()]
         who, depth = " and ".join(deepest) or "things", f"{1e3 * judged.penetration:.3g} mm"
-        raise InputError(f"plan: at the {what} {who} overlap by {depth}; give a posture of wb.solve")
+        raise InputError(f"plan: at {what} {who} overlap by {depth}; give a posture of wb.solve")
     if not judged.constraint_violation <= KEPT:
         state = scene.state(q)
         values = [(term, term.value(state)) for term in problem.constraints]
         misses = [np.maximum(term.lower - value, value - term.upper).max(initial=0.0) for term, value in values]
         worst = int(np.argmax(misses))
         raise InputError(
-            f"plan: the {what} misses {values[worst][0]!r} by {misses[worst]:.3g} m or rad; give a posture of wb.solve"
+            f"plan: {what} misses {values[worst][0]!r} by {misses[worst]:.3g} m or rad; give a posture of wb.solve"
         )
     if not (by := _moved(problem, q[None])) <= KEPT:
-        raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond what is frozen at the start")
+        raise InputError(f"plan: {what} is {by:.3g} m or rad beyond what is frozen at the start")
 
 
 def _moved(problem: Problem, q: Array) -> float:
