@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.flesh import settle
 from wholebody.assessment.all_pairs import AllPairs
+from wholebody.assessment.posture import violations
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import Proximity
 
@@ -88,6 +89,18 @@ def test_constraints_and_measures(free_bodies):
 
 def arm_reaching(planar_arm, target, start, **options):
     return wb.Problem(wb.Scene(planar_arm(LENGTHS)), np.array(start), goals=[wb.Point("tip", target)], **options)
+
+
+@pytest.mark.parametrize("most", [0.0, 0.3, 1.2])
+def test_violations_of_many_postures_are_those_of_each(human, most):
+    """Beyond limits, reach cones and feet, and through the table, that coal is asked for pair by pair."""
+    scene = wb.Scene(human).add(wb.Box((0.5, 0.9, 0.03)), name="table", at=(0.5, 0.0, 0.8))
+    problem = wb.Problem(scene, "standing", constraints=[wb.Hold("left_foot")], clearance=0.005)
+    rng = np.random.default_rng(0)
+    q = np.array([pin.integrate(human.model, problem.start, rng.uniform(-most, most, human.model.nv)) for _ in "12345"])
+    each = [wb.assess(problem, one) for one in q]
+    expected = [max(one.limit_violation, one.constraint_violation, one.clearance_violation) for one in each]
+    np.testing.assert_allclose(violations(problem, q), expected, rtol=0.0, atol=1e-12)
 
 
 def test_optimality_is_zero_where_no_motion_would_help(planar_arm):

@@ -465,6 +465,28 @@ def test_no_motion_leads_past_a_wall_that_limits_close_in(planar_arm: Callable[.
     assert wb.plan(scene, np.zeros(1), np.array([2.8])).solved
 
 
+def test_of_several_postures_the_one_that_is_reached_soonest_is_the_end(planar_arm: Callable[..., wb.Figure]) -> None:
+    """Behind a post the nearer one is out of reach, and an arm of two links has two answers of a place."""
+    scene = wb.Scene(planar_arm((1.0,)))
+    start, ends = np.zeros(1), np.array([[-1.5], [1.0]])
+    for goal in (ends, list(ends), [list(each) for each in ends]):
+        found = wb.plan(scene, start, goal)
+        assert found.solved
+        assert found.clip.q[-1] == pytest.approx(1.0)
+    scene.add(wb.Box((0.1, 0.1, 0.5)), name="post", at=(0.8 * np.cos(0.6), 0.8 * np.sin(0.6), 0.0))
+    assert wb.plan(scene, start, ends).clip.q[-1] == pytest.approx(-1.5)
+    two = wb.Scene(planar_arm((0.5, 0.5)))
+    answers = wb.solutions(wb.Problem(two, goals=[wb.Point("tip", (0.5, 0.5, 0.0))]), apart=0.5)
+    found = wb.plan(two, np.array([1.4, -1.4]), answers)
+    assert found.solved
+    np.testing.assert_allclose(found.clip.q[-1], (0.5 * np.pi, -0.5 * np.pi), atol=1e-4)
+    assert wb.plan(two, np.zeros(2), answers[0]).solved
+    with pytest.raises(wb.InputError, match=r"plan: at goal\[1\] turn0 is 9, beyond its limits"):
+        wb.plan(two, np.zeros(2), [np.ones(2), np.array([9.0, 0.0])])
+    with pytest.raises(wb.InputError, match=r"plan: goal has a Soft, and a plan takes no measures; give a posture"):
+        wb.plan(two, np.zeros(2), [wb.Point("tip", (0.5, 0.5, 0.0)), wb.Soft(wb.Point("tip", (0.5, 0.5, 0.0)))])
+
+
 def test_goals_out_of_reach_and_wrong_ends_are_told() -> None:
     problem, end = shelf(8)
     scene = problem.scene
@@ -1011,6 +1033,47 @@ def test_a_tip_is_displaced_and_all_else_follows_on_what_is_held() -> None:
         apart = human.placement(start, f"{side}_foot").actInv(human.placement(found, f"{side}_foot"))
         np.testing.assert_allclose(apart.homogeneous, np.eye(4), atol=1e-4)
     assert np.abs(pin.difference(human.model, start, found)[:3]).max() > 0.02
+
+
+def test_a_projection_leaves_what_is_within_the_bounds_of_an_end(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A tip is held along x and stays below y, where it is at the start; rows are nearly dependent: it is stretched."""
+    arm, start = planar_arm((0.5, 0.5)), np.array([0.78, 0.02])
+    place = arm.placement(start, "tip").translation
+    problem = wb.Problem(wb.Scene(arm), start, constraints=[Beside(), Below()])
+    with problem.borrow() as workspace:
+        local = ProjectedMotions(problem, workspace)
+        local.admit(start)
+        for turn in ((2e-4, -2e-4), (-1e-4, 3e-4), (1e-4, -4e-4)):
+            beside = start + turn
+            miss = abs(arm.placement(beside, "tip").translation[0] - place[0])
+            assert miss > 1e-5
+            found = local.projected(beside)
+            assert np.linalg.norm(found - beside) < 0.03  # 5 mm along y take 0.7 rad
+            assert arm.placement(found, "tip").translation[0] == pytest.approx(place[0], abs=2e-5)
+
+
+class Below(wb.Constraint):
+    """The tip goes no farther along y than at the start."""
+
+    lower, upper, axis = np.full(1, -np.inf), np.zeros(1), 1
+
+    def resolve(self, scene: wb.Scene, start: Array) -> Below:
+        self.index = scene.model.getFrameId("tip")
+        self.place = scene.figure.placement(start, "tip").translation[self.axis]
+        return self
+
+    def value(self, state: Any) -> Array:
+        return np.array([state.frame(self.index).translation[self.axis] - self.place])
+
+    def jacobian(self, state: Any) -> Array:
+        whole = pin.getFrameJacobian(state.model, state.data, self.index, pin.LOCAL_WORLD_ALIGNED)
+        return np.asarray(whole[self.axis : self.axis + 1])
+
+
+class Beside(Below):
+    """The tip stays where it is along x."""
+
+    lower, axis = np.zeros(1), 0
 
 
 def test_projected_steps_stay_on_what_is_held_and_end_where_they_should() -> None:

@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.interpolate import make_interp_spline
 from scipy.optimize import linprog
 
 import wholebody as wb
+from wholebody.motion.trajectory.retiming import passed
 from wholebody.planning.smoothing import places
 from wholebody.planning.timing import Pace, Timing, least_time, squared_rates, used
 
@@ -56,6 +58,32 @@ def test_rates_are_the_largest_that_a_linear_program_finds() -> None:
     most[[0, -1]] = 0.0
     best = linprog(-np.ones(count), np.array(rows), np.array(ends), bounds=[(0.0, end) for end in most])
     np.testing.assert_allclose(b, best.x, rtol=1e-6, atol=1e-6)
+
+
+def test_a_turn_between_two_postures_does_not_slow_all_of_a_motion(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A joint turns back near the start; limits at 64 places between two postures bound how soon the end is reached."""
+    arm, pace = planar_arm((0.5, 0.4)), Pace(velocity=3.0, acceleration=8.0)
+    path = np.array([np.linspace(0.0, 2.0, 41), np.zeros(41)]).T
+    path[2, 1] = 0.05
+    knots, finest = np.arange(41), np.linspace(0.0, 40.0, 40 * 64 + 1)
+    spline = make_interp_spline(knots, path, k=3)
+    limits = np.full(2, 3.0), np.full(2, 8.0)
+    soonest = passed(squared_rates(spline(finest, 1) / 64.0, spline(finest, 2) / 64.0**2, *limits), pace.dt)[0]
+    q = Timing(arm, path, pace).within()
+    assert max(used(arm, q, pace)) <= 1.001
+    assert len(q) <= 1.2 * len(soonest)
+
+
+def test_what_a_correction_displaces_is_not_slowed_on_and_on(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A frame that is displaced by 0.1 rad is as fast however slow the others are."""
+    arm, path = planar_arm((0.5, 0.4)), np.linspace(0.0, 1.0, 20)[:, None] * np.ones(2)
+    calls = []
+
+    def displaced(q: np.ndarray) -> np.ndarray:
+        calls.append(q)
+        return q + 0.1 * (len(calls) % 7 == 3)
+
+    assert len(Timing(arm, path, Pace()).within(displaced)) < 100
 
 
 def test_frames_of_a_path_with_a_corner_keep_the_limits(planar_arm: Callable[..., wb.Figure]) -> None:

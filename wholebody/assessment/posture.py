@@ -210,6 +210,25 @@ def _values(term: Goal | Constraint, evaluate: Callable[[State], Array], state: 
     return values_and_rows(term, evaluate, state)[0] if is_own(term) else evaluate(state)
 
 
+def violations(problem: Problem, q: Array) -> Array:
+    """Largest violations (n,) of limits, constraints and clearances at postures (n, nq), metres and radians.
+
+    They are those that `assess` finds at each; of arrays, coal is asked for pairs alone that nothing else tells apart.
+    """
+    problem.check_scene()
+    with all_pairs(problem.scene.built).borrow() as pairs:
+        _, _, short = pairs.shortfalls(q, np.broadcast_to(problem.clearances, (len(q), len(problem.clearances))))
+        missed = [largest_violation(problem, pairs.state.update(each)) for each in q]
+    return np.maximum.reduce([short, missed, _beyond(problem, q)])
+
+
+def _beyond(problem: Problem, q: Array) -> Array:
+    """Largest violations (n,) of joint limits at postures (n, nq), radians or metres."""
+    limits = problem.scene.figure.limits
+    values = q[:, limits.idx_q]
+    return np.asarray(np.maximum(limits.lower - values, values - limits.upper).max(axis=1, initial=0.0))
+
+
 _UNTURNED, _UNMOVED = np.eye(3), np.zeros(3)
 
 
@@ -258,7 +277,7 @@ class Judged(NamedTuple):
 
 def judged_postures(problem: Problem, numbers: Numbers, q: Array) -> Judged:
     """Judge postures q (k, nq) of one problem without constraints and bounds, each with its own numbers."""
-    model, built, figure = problem.scene.model, problem.scene.built, problem.scene.figure
+    model, built = problem.scene.model, problem.scene.built
     with all_pairs(built).borrow() as pairs:
         # more bounds of pairs at once take more memory than the processor keeps near
         step = max(1, 50_000 // max(1, len(built.table.pairs)))
@@ -267,14 +286,14 @@ def judged_postures(problem: Problem, numbers: Numbers, q: Array) -> Judged:
     far, turned = np.zeros((2, 1 + len(problem.goals), len(q)))
     for g, goal in enumerate(problem.goals):
         far[g], turned[g] = _errors(goal, joints, [part[:, g] for part in numbers[:3]])
-    values = q[:, figure.limits.idx_q]
-    beyond = np.maximum(figure.limits.lower - values, values - figure.limits.upper).max(axis=1, initial=0.0)
     if model.nq == model.nv:
         away = q - numbers.references
     else:
         away = np.array([pin.difference(model, *each) for each in zip(numbers.references, q, strict=True)])
     measure = problem.measures[0].weight * ((away * away) @ _distance(problem).weights)
-    return Judged(far.max(axis=0), turned.max(axis=0), penetration, short, beyond, np.zeros(len(q)), measure)
+    return Judged(
+        far.max(axis=0), turned.max(axis=0), penetration, short, _beyond(problem, q), np.zeros(len(q)), measure
+    )
 
 
 def _distance(problem: Problem) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.assessment.posture import assess
+from wholebody.assessment.posture import assess, violations
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.compiled import compile_all, compile_seconds
@@ -34,11 +34,13 @@ from wholebody.planning.timing import Pace, Timing, least_time, used
 from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks.base import Bound, Constraint, Goal
+from wholebody.solution import Solution
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import Freeze, StepLimit
 
 KEPT = 1e-4  # m, rad: by which limits, constraints and clearances may be missed in a frame
 PASSED = 5e-4  # m: overlap between two frames that counts
+TOGETHER = 16  # frames that are judged at once: more = cheaper each, later at the end
 OVER = 1.001  # of the limits of velocity and acceleration: the last slowing may end a little above them
 NEEDED = (  # modules whose loops are compiled or read before the clock starts: the first time takes longer than a plan
     "wholebody.terms.linearisation",
@@ -91,7 +93,7 @@ class Plan:
 def plan(
     scene: Scene,
     start: Array | str | None,
-    goal: Array | str | Goal | Iterable[Goal],
+    goal: Array | str | Goal | Solution | Sequence[Array | str | Solution] | Iterable[Goal],
     *,
     constraints: Iterable[Constraint | Bound] = (),
     clearance: float = 0.0,
@@ -108,7 +110,8 @@ def plan(
     Args:
         scene: the figure among things.
         start: (nq,) posture at which the motion begins, the name of one, or None for the figure's first posture.
-        goal: (nq,) posture at which it ends, the name of one, or goals that its end meets.
+        goal: (nq,) posture at which it ends, the name of one, several such as those of `wb.solutions`, at one
+            of which it ends, or goals that its end meets.
         constraints: what holds throughout, such as `wb.Hold("left_foot")`, as in a `wb.Problem`.
         clearance: least distance of every pair, metres; pairs that are nearer at an end may be as near on the way.
         pace: limits of velocity and acceleration, and the time step; None for `wb.planning.Pace()`.
@@ -137,9 +140,9 @@ def plan(
         problem = Problem(scene, start, goals=goals, constraints=constraints, clearance=clearance)
         if any(isinstance(bound, StepLimit) for bound in problem.bounds):
             raise InputError("plan: a StepLimit bounds no plan; give pace=wb.planning.Pace(velocity=1.0)")
-        _check_end(problem, problem.start, "start")
+        _check_end(problem, problem.start, "the start")
         sampler = Sampler(problem, rng)
-        ends = answers(problem, sampler) if goals else iter([(_posture(problem, goal), "")])
+        ends = answers(problem, sampler) if goals else iter([(q, "") for q in _postures(problem, goal)])
         judge = _Judge(problem, pace)
         found = None
         with problem.borrow() as workspace:
@@ -168,6 +171,11 @@ def _goals(goal: Any) -> tuple[Goal, ...]:
     """The goals, where these are given; none for a posture."""
     if isinstance(goal, Goal):
         return (goal,)
+    measures = [one for one in (goal if isinstance(goal, (list, tuple)) else [goal]) if isinstance(one, Measure)]
+    if measures:
+        raise InputError(
+            f"plan: goal has {checks.a(type(measures[0]))}, and a plan takes no measures; give a posture of wb.solve"
+        )
     if isinstance(goal, (str, np.ndarray)) or not isinstance(goal, Iterable):
         return ()
     listed = tuple(goal)
@@ -176,11 +184,18 @@ def _goals(goal: Any) -> tuple[Goal, ...]:
     return listed if any(isinstance(one, Goal) for one in listed) else ()
 
 
-def _posture(problem: Problem, goal: Any) -> Array:
-    figure = problem.scene.figure
-    q = figure.posture(goal) if isinstance(goal, str) else checks.posture(goal, figure.model.nq, "plan: goal")
-    _check_end(problem, q, "goal")
-    return np.array(q, dtype=float)
+def _postures(problem: Problem, goal: Any) -> list[Array]:
+    """The postures (nq,) at which the motion may end, the nearest to the start first."""
+    figure, model, found = problem.scene.figure, problem.scene.model, list[Array]()
+    listed = isinstance(goal, Sequence) or (isinstance(goal, np.ndarray) and goal.ndim > 0)
+    first = goal[0] if listed and len(goal) and not isinstance(goal, str) else 0.0
+    several = np.ndim(first) > 0 or isinstance(first, (str, Solution))
+    for k, one in enumerate(goal if several else [goal]):
+        q = one.q if isinstance(one, Solution) else figure.posture(one) if isinstance(one, str) else one
+        what = f"goal[{k}]" if several else "the goal"
+        found.append(np.array(checks.posture(q, figure.model.nq, f"plan: {what}"), dtype=float))
+        _check_end(problem, found[-1], what)
+    return sorted(found, key=lambda q: float(np.linalg.norm(pin.difference(model, problem.start, q))))
 
 
 def _check_end(problem: Problem, q: Array, what: str) -> None:
@@ -191,23 +206,23 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
         most = int(np.argmax(np.maximum(limits.lower - here, here - limits.upper)))
         joint = scene.model.names[joint_of(scene.model, int(limits.idx_v[most]))]
         raise InputError(
-            f"plan: at the {what} {joint} is {here[most]:.4g}, beyond its limits {limits.lower[most]:.4g} and "
+            f"plan: at {what} {joint} is {here[most]:.4g}, beyond its limits {limits.lower[most]:.4g} and "
             f"{limits.upper[most]:.4g}; give figure.clamp(q) for the nearest posture within limits"
         )
     if not judged.penetration <= KEPT:
         deepest = [scene.piece_owner[piece] for piece in scene.contacts(q, 0.0).pair[:1].ravel().tolist()]
         who, depth = " and ".join(deepest) or "things", f"{1e3 * judged.penetration:.3g} mm"
-        raise InputError(f"plan: at the {what} {who} overlap by {depth}; give a posture of wb.solve")
+        raise InputError(f"plan: at {what} {who} overlap by {depth}; give a posture of wb.solve")
     if not judged.constraint_violation <= KEPT:
         state = scene.state(q)
         values = [(term, term.value(state)) for term in problem.constraints]
         misses = [np.maximum(term.lower - value, value - term.upper).max(initial=0.0) for term, value in values]
         worst = int(np.argmax(misses))
         raise InputError(
-            f"plan: the {what} misses {values[worst][0]!r} by {misses[worst]:.3g} m or rad; give a posture of wb.solve"
+            f"plan: {what} misses {values[worst][0]!r} by {misses[worst]:.3g} m or rad; give a posture of wb.solve"
         )
     if not (by := _moved(problem, q[None])) <= KEPT:
-        raise InputError(f"plan: the {what} is {by:.3g} m or rad beyond what is frozen at the start")
+        raise InputError(f"plan: {what} is {by:.3g} m or rad beyond what is frozen at the start")
 
 
 def _moved(problem: Problem, q: Array) -> float:
@@ -262,12 +277,15 @@ class _Judge:
     def __init__(self, problem: Problem, pace: Pace) -> None:
         self.problem, self._pace = problem, pace
         self.took = 0.0  # s: that a path took from here to its judgement
-        spent = []
+        scene, spent = problem.scene, list[float]()
+        self._sweep = Sweep(scene.model, scene.geometry, scene.pair_table)
+        beside = np.asarray(pin.integrate(scene.model, problem.start, np.full(scene.model.nv, 1e-3)))
         for _ in range(3):  # the least, as a busy machine takes several times as long now and then
             began = _computed()
-            assess(problem, problem.start)
+            violations(problem, np.array([problem.start] * 4))
+            self._sweep.first_contact(problem.start, beside)
             spent.append(_computed() - began)
-        self._frame = 3.0 * min(spent)  # s: each is also swept from the one before
+        self._frame = min(spent)  # s: of a frame that is near more things, and of the sweep to the next one
 
     def in_time(self, path: list[Array], share: float = 1.0, least: float = 0.2) -> AbstractContextManager[None]:
         """Inside it the budget ends early enough to judge a motion along postures (nq,), of half a second at least."""
@@ -286,11 +304,10 @@ class _Judge:
         q = np.concatenate([Timing(scene.figure, part, pace, own).within(local.corrected) for part in parts])
         use = used(scene.figure, q, pace, own)
         asked, worst = self._between(q[-1]), _moved(self.problem, q)
-        for frame in q:  # as far as the first that misses something
+        for first in range(0, len(q), TOGETHER):  # as far as the first that misses something
             if not worst <= KEPT or BUDGET.over:
                 break
-            one = assess(asked, frame)
-            worst = max(worst, one.limit_violation, one.constraint_violation, one.clearance_violation)
+            worst = max(worst, float(violations(asked, q[first : first + TOGETHER]).max()))
         faults = [
             f"a frame misses what must hold by {worst:.3g} m or rad" if not worst <= KEPT else "",
             f"velocities reach {use.velocity:.3g} of their limits" if not use.velocity <= OVER else "",
@@ -299,7 +316,7 @@ class _Judge:
         ]
         late = BUDGET.over
         if not (late or any(faults)):
-            sweep = Sweep(scene.model, scene.geometry, scene.pair_table)
+            sweep = self._sweep
             free = (not BUDGET.over and sweep.first_contact(*pair, tolerance=PASSED) is None for pair in pairwise(q))
             passed = next((k for k, kept in enumerate(free, 1) if not kept), 0)
             faults.append(f"something is passed through before frame {passed}" if passed else "")

@@ -54,9 +54,7 @@ class ProjectedMotions(Geodesics):
         sides = [np.broadcast_arrays(term.lower, term.upper, term.value(state))[:2] for term in terms]
         self._bounds = np.hstack([np.zeros((2, 0)), *sides])
         self._equal = self._bounds[0] == self._bounds[1]
-        low, high = self._kept.sides  # where an iteration brings values: to these alone, rounding leaves them beyond
-        room = np.minimum(WITHIN, 0.5 * (high - low))
-        self._aims: Array = np.where(self._equal, self._bounds, [low + room, high - room])
+        self._aims = self._aimed_at()
         self._away = np.zeros(self._model.nv)
         self._on = set[bytes]()  # postures that were seen to be on what is held
         self._last = b"", self._packed(problem.start, -1.0)  # the posture that was linearised last, and what is there
@@ -86,8 +84,15 @@ class ProjectedMotions(Geodesics):
     def admit(self, q: Array) -> None:
         """See `Geodesics`."""
         super().admit(q)
+        self._aims = self._aimed_at()
         least = np.maximum(self._least + MISSED + self.bent, 0.0)
         self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
+
+    def _aimed_at(self) -> Array:
+        """(2, c) where an iteration brings values: to the sides alone, rounding leaves them beyond."""
+        low, high = self._kept.sides  # those of ends too: what is within them is not displaced
+        room = np.minimum(WITHIN, 0.5 * (high - low))
+        return np.where(self._equal, self._bounds, [low + room, high - room])
 
     def _projected(self, q: Array) -> Array | None:
         for _ in range(ITERATIONS):

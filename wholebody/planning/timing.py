@@ -58,6 +58,7 @@ class Pace(Checked):
         return own if self.velocity is None else np.minimum(own, self.velocity)
 
 
+FINER = 4  # places of a path between two postures at which limits are kept; fewer = all is slowed for what exceeds them
 STILL = 1e-7  # rad, m: a displacement that counts as none
 
 
@@ -70,12 +71,13 @@ class Timing:
         knots = np.arange(len(path))
         self._spline = make_interp_spline(knots, places(figure.model, path), k=min(3, len(path) - 1))
         limits = pace.fastest(figure), np.full(figure.model.nv, pace.acceleration)
-        self._b = squared_rates(self._spline(knots, 1), self._spline(knots, 2), *limits)
+        at = np.linspace(0.0, knots[-1], FINER * knots[-1] + 1)
+        self._b = squared_rates(self._spline(at, 1) / FINER, self._spline(at, 2) / FINER**2, *limits)
 
     def frames(self, slower: float) -> Array:
         """Postures (frames, nq), `pace.dt` apart, all of it so many times as slow as the limits let it be."""
         model, path = self._figure.model, self._path
-        between = self._spline(passed(self._b, self._pace.dt / slower)[0])[1:-1]
+        between = self._spline(passed(self._b, self._pace.dt / slower)[0] / FINER)[1:-1]
         found = [self._figure.clamp(np.asarray(pin.integrate(model, path[0], place))) for place in between]
         return np.array([path[0], *found, path[-1]])
 
@@ -92,6 +94,8 @@ class Timing:
             use = used(self._figure, q, self._pace, self._bounds)
             over = max(use.velocity, np.sqrt(use.acceleration), use.step)
             if (over <= 1.0 and exact) or not np.isfinite(over):
+                break
+            if over > 3.0 and exact and corrected is not None:  # a correction jumps, however slow all else is
                 break
             if use.step > 1.0 and 5.0 * (left - BUDGET.left) * over > BUDGET.left:  # frames of which none is judged
                 break

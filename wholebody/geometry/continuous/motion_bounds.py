@@ -121,12 +121,10 @@ def meeting_blocks(table: PairTable, centers: Array, speed: Array) -> Indices:
     begin, second, body, first, members = table.blocks
     if not len(second):
         return np.arange(len(table.pairs))
-    middle, radius = np.zeros((len(first) - 1, 3)), np.zeros(len(first) - 1)
-    for number in range(len(radius)):
-        own = members[first[number] : first[number + 1]]
-        middle[number] = centers[own].mean(axis=0)
-        out = np.linalg.norm(centers[own] - middle[number], axis=1) + table.reach[own] + speed[own]
-        radius[number] = out.max()
+    counts, own = np.diff(first), centers[members]
+    middle = np.add.reduceat(own, first[:-1]) / counts[:, None]
+    out = np.linalg.norm(own - np.repeat(middle, counts, axis=0), axis=1) + table.reach[members] + speed[members]
+    radius = np.maximum.reduceat(out, first[:-1])
     meet = second < 0
     beside = np.flatnonzero(~meet)
     away = np.linalg.norm(centers[second[beside]] - middle[body[beside]], axis=1) - table.reach[second[beside]]
