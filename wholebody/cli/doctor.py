@@ -7,8 +7,8 @@ import argparse
 from rich.markup import escape
 from rich.table import Table
 
-from wholebody.cli.tables import console
 from wholebody.cli.examination import examine
+from wholebody.cli.tables import console
 from wholebody.version import __version__
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}

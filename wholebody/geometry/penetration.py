@@ -1,9 +1,9 @@
 """Penetration of two objects: the global penetration depth of unions of convex pieces, and the least separation.
 
 The least separation is the point nearest to the origin outside the union of the Minkowski differences of all pairs (see
-`wholebody.geometry.minkowski`). The problem is not convex, because each pair may separate on any side. So it is the best
-of many local searches: each begins at the first free place along a direction, keeps the plane that separates each pair
-there, and takes the least translation under these planes, n . t >= h(n), until it becomes no shorter.
+`wholebody.geometry.minkowski`). The problem is not convex, because each pair may separate on any side. The answer is
+the best of many local searches: each begins at the first free place along a direction, keeps the plane that separates
+each pair there, and takes the least translation under these planes, n . t >= h(n), until it becomes no shorter.
 """
 
 from __future__ import annotations
