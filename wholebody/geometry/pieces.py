@@ -143,12 +143,12 @@ def _swept_hull(geometry: Any) -> SweptPoints:
     return known
 
 
-def stretched(geometry: Any, unit: SweptPoints, factors: Array) -> Any:
-    """The same hull, whose swept points are those of a unit hull stretched along its axes by factors (3,)."""
-    faces = unit.faces / (*factors, 1.0)  # n . x <= b of the unit hull, in the coordinates of this
+def stretch(geometry: Any, unit: Any, factors: Array) -> None:
+    """Know the swept points of a hull, which is a unit one stretched along its axes by factors (3,)."""
+    points, _, faces, *_ = swept_points(unit)
+    faces = faces / (*factors, 1.0)  # n . x <= b of the unit hull, in the coordinates of the other
     faces /= np.sqrt((faces[:, :3] ** 2).sum(axis=1))[:, None]
-    _KNOWN[geometry] = _points_of_hull(unit.points * factors, faces)
-    return geometry
+    _KNOWN[geometry] = _points_of_hull(points * factors, faces)
 
 
 def _points_of_hull(points: Array, faces: Array) -> SweptPoints:

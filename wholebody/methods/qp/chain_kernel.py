@@ -76,8 +76,8 @@ def reach(
             before = q.copy()
             asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf, others
             found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
-            for i in range(len(q)):  # 0.1 rad or m: where rows are as many as joints, only singular ends move farther
-                isolated = isolated and (len(q) != equal or abs(q[i] - before[i]) < 0.1)
+            for i in range(len(q) if len(q) == equal and asked[3] == 1.0 else 0):
+                isolated = isolated and abs(q[i] - before[i]) < 0.1  # rad or m: only singular ends move farther
             if found[k, 2] == 0.0:
                 copy(before, q)
         if found[k, 2] >= 0.0:
