@@ -15,7 +15,7 @@ from tests.flesh import settle
 from tests.reference import moved_pairs as reference
 from wholebody.assessment import all_pairs
 from wholebody.assessment.all_pairs import AllPairs
-from wholebody.geometry import hull, pair_distances
+from wholebody.geometry import hull, pair_distances, pieces
 from wholebody.geometry.continuous.moved_pairs import QueryResult, far_moved
 from wholebody.geometry.large_models import TABLED, geometry_model
 from wholebody.motion.checking import check
@@ -214,6 +214,22 @@ def test_a_scene_of_more_things_than_are_tabled_is_as_one_of_few() -> None:
         assert copied.contacts(q, 0.05).distance == pytest.approx(contacts.distance, abs=2e-6)
     scene.move("thing 5", at=(0.0, 0.0, 1.0))
     assert "thing 5" in {scene.piece_owner[piece] for piece in scene.overlapping(q).pair.ravel().tolist()}
+
+
+def test_hulls_of_cylinders_are_made_once_and_their_faces_are_those_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many sizes there are: a scene is built anew when a thing comes."""
+    scene = wb.Scene(wb.load("avatar")).add(wb.Cylinder(0.1, 0.2), name="one")
+    _ = scene.built
+    made: list[int] = []
+    faces: list[int] = []
+    make, look = hull.coal_convex, pieces._convex_faces
+    monkeypatch.setattr(hull, "coal_convex", lambda *given: (made.append(1), make(*given))[1])
+    monkeypatch.setattr(pieces, "_convex_faces", lambda *given: (faces.append(1), look(*given))[1])
+    for number in range(1100):
+        scene.add(wb.Cylinder(0.01 + 1e-5 * number, 0.3), name=f"post {number}", at=(5.0, 0.0, 0.01 * number))
+    for changed in (scene, scene.remove("one")):
+        assert changed.built.table.points.shape[0] > 1100 * 2 * hull.SIDES
+    assert (len(made), len(faces)) == (1100, 0)
 
 
 def test_hulls_of_like_shapes_are_found_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,10 @@ def supports(shape):
         return np.abs(d) @ np.array(shape.size) / 2
     if isinstance(shape, wb.Ellipsoid):
         return np.linalg.norm(d * shape.semi_axes, axis=1)
+    if isinstance(shape, wb.Cylinder):  # a prism around it
+        angles = 2 * np.pi * np.arange(64) / 64
+        ring = shape.radius / np.cos(np.pi / 64) * np.column_stack([np.cos(angles), np.sin(angles)])
+        return (d[:, :2] @ ring.T).max(axis=1) + 0.5 * shape.length * np.abs(d[:, 2])
     return (d @ (POINTS - shape.pieces()[0].placement.translation).T).max(axis=1)
 
 
@@ -34,6 +38,7 @@ SHAPES = [
     wb.Box((0.4, 0.2, 0.1)),
     wb.Ellipsoid((0.3, 0.2, 0.1)),
     wb.Hull(POINTS),
+    wb.Cylinder(0.05, 0.3),
 ]
 
 
@@ -72,7 +77,7 @@ def test_many_pieces_have_each_their_own_in_the_order_given():
         assert (each.reach, each.width) == (pytest.approx(0.5 * np.linalg.norm(size)), min(size))
 
 
-@pytest.mark.parametrize("shape", [SHAPES[2], SHAPES[4]], ids=["box", "hull"])
+@pytest.mark.parametrize("shape", [SHAPES[2], *SHAPES[4:]], ids=["box", "hull", "cylinder"])
 def test_faces_hold_the_core_points_and_are_touched_by_three(shape):
     swept = swept_points(shape.pieces()[0].geometry)
     height = swept.points @ swept.faces[:, :3].T - swept.faces[:, 3]

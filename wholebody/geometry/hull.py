@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array, cross
 from wholebody.base.errors import InputError
-from wholebody.geometry.pieces import CORNERS, LARGEST, SMALLEST, Piece, hull_triangles
+from wholebody.geometry.pieces import CORNERS, LARGEST, SMALLEST, Piece, hull_triangles, stretch
 
 MOST_NEIGHBOURS = 255  # most edges at one vertex that coal can represent
 
@@ -237,18 +237,20 @@ SECTORS, TUBE_SIDES = 24, 12
 
 
 @lru_cache(maxsize=4)
-def _unit_cylinder(sides: int) -> tuple[Array, Any, float]:
-    """Corners (n, 3) and triangles, which take longest to find, and volume of the prism around a cylinder of size 1."""
+def _unit_cylinder(sides: int) -> tuple[Piece, Any]:
+    """The prism around a cylinder of size 1, and its triangles, which take longest to find."""
     ring = around(1.0, sides)
     piece = hull_piece(np.vstack([np.column_stack([ring, np.full(sides, z)]) for z in (-0.5, 0.5)]), "Cylinder")
-    return np.array(piece.geometry.points()), coal_triangles(hull_triangles(piece.geometry)), piece.volume
+    return piece, coal_triangles(hull_triangles(piece.geometry))
 
 
 @lru_cache(maxsize=1024)  # scenes have many things of one size, which share what coal and others compute of them
 def cylinder_pieces(radius: float, length: float, sides: int = SIDES) -> tuple[Piece, ...]:
     """The prism of so many sides around a cylinder along z, centred at its origin."""
-    corners, triangles, volume = _unit_cylinder(sides)
-    geometry = coal_convex(corners * (radius, radius, length), triangles)
+    (unit, _, volume), triangles = _unit_cylinder(sides)
+    size = np.array([radius, radius, length])
+    geometry = coal_convex(np.array(unit.points()) * size, triangles)
+    stretch(geometry, unit, size)
     return (Piece(geometry, pin.SE3.Identity(), volume * radius**2 * length),)
 
 

@@ -45,10 +45,7 @@ _MADE: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
 
 def kept(shape: Any, make: Callable[[], _T]) -> _T:
-    """What a shape is made into, made the first time and kept with it: scenes are built anew when a thing comes.
-
-    It is for shapes that equal themselves alone.
-    """
+    """What a shape is made into, made the first time and kept with it: scenes are built anew when a thing comes."""
     found: _T | None = _MADE.get(shape)
     if found is None:
         found = _MADE[shape] = make()
@@ -141,13 +138,20 @@ _KNOWN: WeakKeyDictionary[Any, SweptPoints] = WeakKeyDictionary()
 def _swept_hull(geometry: Any) -> SweptPoints:
     known = _KNOWN.get(geometry)
     if known is None:
-        known = _KNOWN[geometry] = _points_of_hull(geometry)
+        points = np.array(geometry.points())
+        known = _KNOWN[geometry] = _points_of_hull(points, _convex_faces(geometry, points))
     return known
 
 
-def _points_of_hull(geometry: Any) -> SweptPoints:
-    points = np.array(geometry.points())
-    faces = _convex_faces(geometry, points)
+def stretch(geometry: Any, unit: Any, factors: Array) -> None:
+    """Know the swept points of a hull, which is a unit one stretched along its axes by factors (3,)."""
+    points, _, faces, *_ = swept_points(unit)
+    faces = faces / (*factors, 1.0)  # n . x <= b of the unit hull, in the coordinates of the other
+    faces /= np.sqrt((faces[:, :3] ** 2).sum(axis=1))[:, None]
+    _KNOWN[geometry] = _points_of_hull(points * factors, faces)
+
+
+def _points_of_hull(points: Array, faces: Array) -> SweptPoints:
     width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
     reach = float(np.linalg.norm(points, axis=1).max())
     return SweptPoints(points, 0.0, faces, reach, _NO_AXIS, width, np.abs(points).max(axis=0))

@@ -138,7 +138,7 @@ class Cylinder(Shape):
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
-        return cylinder_pieces(self.radius, self.length)
+        return kept(self, lambda: cylinder_pieces(self.radius, self.length))
 
     @property
     def added_volume(self) -> float:

@@ -6,6 +6,7 @@ Seeds are the branches of the closed form of an arm that has one, else the start
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain as joined
 from itertools import islice
 from typing import NamedTuple
 
@@ -132,7 +133,8 @@ class Descents:
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
                 # Inequalities reject what is nearest: the search for the closest posture goes along them.
-                return self._nearest() if not self.asked.bounded and self._is_out_of_reach() else None
+                begins = None if self.asked.bounded else self._if_out_of_reach()
+                return None if begins is None else self._nearest(begins)
             unsettled = met is not None and self.measured and not met.stationary  # as limits are near
             if (met is not None and met.blocked is None and not unsettled) or finite or self.control.over:
                 return met
@@ -269,33 +271,38 @@ class Descents:
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
 
-    def _is_out_of_reach(self) -> bool:
-        """Whether all postures of six joints at the goal and at those nearby are beyond limits or far inside things."""
+    def _if_out_of_reach(self) -> list[Array] | None:
+        """What of six joints' postures at the goal hardly overlaps (n,), if all there and nearby are not free."""
         chain, (goals, at, _, clearances, *_) = self.chain, self.asked
         if self.settings.tolerance > NEARBY:
-            return False  # postures farther from the goal would do
+            return None  # postures farther from the goal would do
         found = chain.loosely_met(goals, self.settings.seed)
         if len(found) and self.workspace.model.nv > len(self.start):
-            return False  # others may make room
-        deep = clearances - SEEDS.deep
+            return None  # others may make room
+        deep, hardly = clearances - SEEDS.deep, list[Array]()
         within = max(0.0, self.within - SEEDS.deep)
-        return not any(is_free(self.workspace, chain.posture(values, at), deep, within) for values in found)
+        for values in found:
+            q = chain.posture(values, at)
+            if is_free(self.workspace, q, clearances, self.within):
+                return None
+            if is_free(self.workspace, q, deep, within):
+                hardly.append(values)
+        return hardly
 
-    def _nearest(self) -> Met:
+    def _nearest(self, near: list[Array]) -> Met:
         """The closest postures of descents from the first seeds with everything held: a few, which differ."""
         seeds = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together))
         # All of them, although some may meet the goals inside of things.
         found, _ = self._descended(seeds, how_far(self.settings, len(seeds), others=True))
-        values, near = list[Array](), list[Array]()
-        for k in found[:, 0].argsort():
-            differs = all(np.abs(seeds[k] - each).max() > SEEDS.differing for each in values)
-            if differs and self._is_free(q := self.chain.posture(seeds[k], self.asked.at)):
-                values.append(seeds[k])
-                near.append(q)
-            if len(near) == SEEDS.near:
+        values, at = list[Array](), self.asked.at
+        free = (seeds[k] for k in found[:, 0].argsort() if self._is_free(self.chain.posture(seeds[k], at)))
+        for each in joined(near, free):
+            if all(np.abs(each - other).max() > SEEDS.differing for other in values):
+                values.append(each)
+            if len(values) == SEEDS.near:
                 break
-        near = near or [self.asked.at]
-        return Met(near[0], tuple(self.trace), False, near=tuple(near))
+        begins = tuple([self.chain.posture(each, at) for each in values]) or (at,)
+        return Met(begins[0], tuple(self.trace), False, near=begins)
 
     def _descended(self, seeds: Array, asked: Array) -> tuple[Array, int]:
         """What is found (k, 4) from seeds (k, n), which become ends, and how many were taken."""

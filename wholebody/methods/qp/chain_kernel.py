@@ -71,10 +71,13 @@ def reach(
         if not left <= tolerance:
             continue
         _unwind(chain, q, nearest[0])
+        isolated = True
         if weighed:
             before = q.copy()
             asked_of = tolerance, CLEARLY * best if asked[4] > 0.0 else np.inf, others
             found[k, 3] += _least_effort(chain, goals, room, q, nearest, asked_of, found[k])
+            for i in range(len(q) if len(q) == equal and asked[3] == 1.0 else 0):
+                isolated = isolated and abs(q[i] - before[i]) < 0.1  # rad or m: only singular ends move farther
             if found[k, 2] == 0.0:
                 copy(before, q)
         if found[k, 2] >= 0.0:
@@ -82,7 +85,7 @@ def reach(
             for i in range(len(q)):
                 found[k, 1] += nearest[1, i] * (q[i] - nearest[0, i]) ** 2
             best = min(best, found[k, 1])
-        enough -= 1.0
+        enough -= 1.0 if isolated else 0.0  # of singular ends a seed of less effort may lead to more
         if enough <= 0.0:
             return k + 1
     return len(seeds)

@@ -186,11 +186,19 @@ def _with_parallels(slack: float, h: Array, o: Array, place: Array, found: Array
         count, low, high = _angles(h2, h5, h6, _dot(h2, _turn(h1, -q1, _rotated(place, h6))), slack)
         for inner in range(count):
             q5 = low if inner == 0 else high
-            q6 = _between(h6, _rotated_back(place, _turn(h1, q1, h2)), _turn(h5, -q5, h2))
-            turned = _turn(h1, -q1, _rotated(place, _turn(h6, -q6, _turn(h5, -q5, side))))
-            total = _between(h2, side, turned)
-            elbow = _minus(back, _turn(h2, total, _minus(end, o4)))
-            both, up, down = _bent(o2, h3, o3, o4, elbow, slack)
+            asked = _rotated_back(place, _turn(h1, q1, h2))
+            across = _cross(h6, asked)
+            free = _dot(across, across) < 1e-10  # axes 2 and 6 are parallel to 1e-5 rad: any q6 meets the rotation
+            for k in range(16 if free else 1):  # to the first with which the arm is long enough
+                q6 = _between(h6, asked, _turn(h5, -q5, h2))
+                if free:
+                    q6 = np.pi * inner + FULL / 16 * ((k + 1) // 2) * (2 * (k % 2) - 1)
+                turned = _turn(h1, -q1, _rotated(place, _turn(h6, -q6, _turn(h5, -q5, side))))
+                total = _between(h2, side, turned)
+                elbow = _minus(back, _turn(h2, total, _minus(end, o4)))
+                both, up, down = _bent(o2, h3, o3, o4, elbow, slack)
+                if both > 0:
+                    break
             for k in range(both):
                 q3 = up if k == 0 else down
                 q2 = _between(h2, _minus(_plus(o3, _turn(h3, q3, _minus(o4, o3))), o2), _minus(elbow, o2))
