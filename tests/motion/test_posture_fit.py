@@ -78,6 +78,27 @@ def test_a_step_does_not_end_inside_what_was_far_away_when_it_began(tmp_path: Pa
     assert q[0] == pytest.approx(0.04 / 0.5, abs=0.01)  # it stops before the block, and is not pushed through
 
 
+def test_a_step_of_a_wrong_linearisation_is_made_shorter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows that miss a block let two steps of 0.24 rad end 4 cm inside it: legs that fold did, and stayed there."""
+    (path := tmp_path / "arm.urdf").write_text(ARM)
+    figure = wb.load(path)
+    scene = wb.Scene(figure).add(wb.Box((0.1, 0.1, 0.1)), name="block", at=(0.45, 0.1, 0.0))
+    layout = Layout([], [], np.zeros((0, 0)), np.zeros(0), np.zeros(0), [HeldPoint("left_wrist", "", 1, TIP)])
+    none, aim = np.zeros((0, 3)), np.array([[0.485, 0.12, 0.0]])
+    goals = Goals(none, np.zeros((0, 3, 3)), aim, np.full((1, 3), 30.0), figure.neutral, np.zeros(1))
+
+    def step(self: Fitter, q: np.ndarray, goals: Goals, most: np.ndarray | None = None, **_: object) -> np.ndarray:
+        return np.asarray(np.clip(q + 0.24, *((-3.0, 3.0) if most is None else q + most)))
+
+    monkeypatch.setattr(Fitter, "step", step)
+    with scene.borrow() as workspace:
+        fitter = Fitter(figure, layout, workspace)
+        assert fitter.depth(figure.neutral + 0.24) > 0.03
+        q = fitter.careful_step(figure.neutral, goals, None)
+        assert fitter.depth(q) < 0.01
+    assert q[0] > 0.0
+
+
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_a_plate_is_kept_above_tiles_however_many_are_as_near(tmp_path: Path, count: int) -> None:
     """Of more pairs than freedoms none was kept where all are as near as the nearest."""

@@ -234,16 +234,17 @@ class Fitter:
         """
         found = self.step(q, goals, most=most, midway=midway)
         far = float(np.abs(pin.difference(self.model, q, found)).max())
-        if far <= NEAR:
+        if far <= NEAR or (far <= FAR and self.depth(found) <= DEEP):
             return found
+        deepest, bounds = max(self.depth(q), DEEP), (-np.inf, np.inf) if most is None else most
         if far <= FAR:
-            if self.depth(found) <= DEEP:
-                return found
             again = self.step(q, goals, most=most, midway=midway, within=FARTHER)
-            return min(found, again, key=lambda each: self._merit(each, goals))
-        before, bounds = self._merit(q, goals), (-np.inf, np.inf) if most is None else most
+            found = min(found, again, key=lambda each: self._merit(each, goals))
+            if self.depth(found) <= deepest:
+                return found
+        before = self._merit(q, goals)
         for _ in range(4):
-            if self._merit(found, goals) <= before:
+            if self._merit(found, goals) <= before and self.depth(found) <= deepest:
                 return found
             far *= SHORTER
             reach = np.clip(np.outer((-far, far), np.ones(self.model.nv)), bounds[0], bounds[1])

@@ -216,8 +216,7 @@ class Run:
 
     def _fit(self, k: int) -> None:
         """The free posture of a frame, from that before."""
-        near = self._chain[k - 1][0] if k else None
-        best = self._fitted(k, near, k % self.every == 0)
+        best = self._fitted(k, self._chain[k - 1][0] if k else None, k % self.every == 0)
         other = self._backward.pop(k, None)
         if other is not None and other[1] < WORTH * best[1]:
             best = other

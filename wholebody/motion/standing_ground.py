@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -215,20 +216,14 @@ def ground_on(
     if size == 1.0:
         return _ground(motion, joints, surface)
     # speeds and heights of rests are those of people
-    found = _ground(motion.resized(1.0 / size), joints, None if surface is None else _resized(surface, size))
+    found = _ground(motion.resized(1.0 / size), joints, surface and partial(_below, surface, size))
     holds = [with_values(each, place=size * each.place, height=size * each.height) for each in found.footholds]
     lows = {role: size * low for role, low in found.lowest.items()}
     return replace(found, footholds=tuple(holds), lowest=lows, levels=tuple(size * level for level in found.levels))
 
 
-def _resized(surface: Surface, size: float) -> Surface:
-    """Surfaces of a world of which all lengths are divided by a size."""
-
-    def height(place: Array, frame: int) -> float | None:
-        found = surface(size * place, frame)
-        return None if found is None else found / size
-
-    return height
+def _below(surface: Surface, size: float, place: Array, frame: int) -> float | None:
+    return (height := surface(size * place, frame)) and height / size
 
 
 def _ground(motion: SkeletonMotion, joints: Mapping[str, int], surface: Surface | None) -> Ground:
