@@ -22,7 +22,7 @@ from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.studies.many import Running, SolveProgress, run_cases
 from wholebody.studies.populations import people as sampled
-from wholebody.studies.records import CANCELLED, ENDED, REFUSED, Records
+from wholebody.studies.records import CANCELLED, ENDED, HELD, REFUSED, Records
 from wholebody.studies.study import TaskFunction, Variant, loaded_person, planned, warn_of_first
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
@@ -74,7 +74,7 @@ class Accommodation(Shown):
         sexes: "male" or "female" for each; "" for figures that are no people.
         dimensions: for each person, name to metres (mass: kilograms); empty for figures that are no people.
         reaches: whether each person meets the goals.
-        fits: whether each person does so without overlap and with all constraints.
+        fits: whether each person does so with all distances, limits and constraints kept.
         sees: whether each person sees the point; None where none was given.
         settings: joint of what is adjustable, such as "seat/slide", to its setting for each person, metres or radians;
             NaN for who was refused. Empty where nobody is joined with an adjustable figure.
@@ -272,11 +272,7 @@ def accommodation(
         raise InputError(f"accommodation: everybody is refused; the first, {records[0].name}: {records[0].message}")
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
     # m, rad: by which limits, constraints and distances may be violated by somebody who fits
-    fits = tuple(
-        one.q is not None
-        and all(missed <= 1e-4 for missed in (one.penetration, one.limit_violation, one.constraint_violation))
-        for one in records
-    )
+    fits = tuple(one.q is not None and all(getattr(one, held) <= 1e-4 for held in HELD) for one in records)
     seen = None
     if point is not None:
         seen = tuple(  # a problem that failed is not made again

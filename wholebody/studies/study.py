@@ -188,7 +188,23 @@ class Variant:
             return self.make(person, self.target, self.layout)
         figure = loaded(_fixed(person)) if isinstance(person, Mapping) else person
         made: Problem = self.make(figure, self.target, self.layout)
+        _check_of(figure, made)
         return made
+
+
+def _check_of(figure: Figure | None, made: Any) -> None:
+    """Refuse a problem of people among whom the one that the task was given is not: all cases would be one body."""
+    given = None if figure is None else figure.describe().person
+    if given is None or not isinstance(made, Problem):
+        return
+    own = made.scene.figure
+    bodies = [one.describe().person for one in (own, *(member.figure for member in own.members.values()))]
+    sizes = {(body.sex, body.stature, body.mass) for body in bodies if body is not None}
+    if sizes and (given.sex, given.stature, given.mass) not in sizes:
+        raise InputError(
+            f"the task's problem is of {own.name!r} of another size than the figure that the task was given; "
+            "pose that one: wb.Scene(figure)"
+        )
 
 
 @lru_cache(maxsize=64)
