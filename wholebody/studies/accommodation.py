@@ -253,7 +253,7 @@ def accommodation(
     given = sampled(100) if people is None else people
     if not isinstance(given, Mapping) or not given:
         raise InputError(
-            f"accommodation: people is {checks.shown(people)}; give people by name, such as wb.people(100)"
+            f"accommodation: people is {checks.shown(people)}; give {{name: person, ...}}, such as wb.people(100)"
         )
     who = {name: loaded_person(one) for name, one in given.items()}
     order = sorted(who, key=lambda name: ("", 0.0) if (one := who[name]) is None else (one.sex, one.stature))
