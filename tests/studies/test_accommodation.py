@@ -122,6 +122,12 @@ def test_who_is_solved_from_the_own_start_is_counted_where_that_of_another_is_re
     assert found.share == 1.0
 
 
+def test_people_are_design_cases_by_name_too() -> None:
+    """A woman of the 5th percentile of stature fits under 1.70 m, and a man of the 95th does not."""
+    found = wb.accommodation(upright_under(1.70), {"small": "F5", "tall": "M95"}, sees=(2.0, 0.0, 1.2))
+    assert dict(zip((one.name for one in found.records), found.fits, strict=True)) == {"small": True, "tall": False}
+
+
 def test_those_refused_are_in_no_share() -> None:
     def task(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
         if figure.describe().person.stature > 1.85:

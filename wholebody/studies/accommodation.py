@@ -23,7 +23,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.studies.many import Running, SolveProgress, run_cases
 from wholebody.studies.populations import people as sampled
 from wholebody.studies.records import CANCELLED, ENDED, HELD, REFUSED, Records
-from wholebody.studies.study import TaskFunction, Variant, loaded_person, planned, warn_of_first
+from wholebody.studies.study import TaskFunction, Variant, loaded_person, options_of, planned, warn_of_first
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
@@ -229,7 +229,7 @@ def accommodation(
 
     Args:
         task: a task file, or a function, see `study`; its target and layout are None.
-        people: by name, as `wb.people` and `wb.boundary` make them; `wb.people(100)` if left out.
+        people: by name, as `wb.people` and `wb.boundary` make them, or as of `study`; `wb.people(100)` if left out.
         sees: (3,) a point that has to be seen without turning the head, metres; None for none.
         method: name or settings, see `study`; if left out with a function, "qp" with a smaller budget, as neighbours'
             answers are starts. It leaves out the measures where nothing of them is counted, that is, nobody is to see
@@ -257,7 +257,7 @@ def accommodation(
         )
     who = {name: loaded_person(one) for name, one in given.items()}
     order = sorted(who, key=lambda name: ("", 0.0) if (one := who[name]) is None else (one.sex, one.stature))
-    population = {name: given[name] for name in order}
+    population = {name: options_of(given[name]) for name in order}
     make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
     variants = [Variant(make, person, None, None) for person in population.values()]
     if method is None and callable(task):

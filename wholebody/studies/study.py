@@ -136,7 +136,7 @@ def planned(
         raise InputError("study: nothing varies; give people, targets or layouts")
     if prod(len(values) or 1 for values in factors) > MOST_CASES:
         raise InputError(f"study: more than {MOST_CASES} cases; give fewer people, targets or layouts")
-    factors[0] = {name: _person(person) for name, person in factors[0].items()}
+    factors[0] = {name: options_of(person) for name, person in factors[0].items()}
     if file is None and any(isinstance(person, Mapping) and "called" in person for person in factors[0].values()):
         raise InputError("study: people have 'called', which names a figure of a task file; the function knows them")
     if file is not None:
@@ -221,7 +221,7 @@ def _fixed(person: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
     )
 
 
-def _person(given: Any) -> Any:
+def options_of(given: Any) -> Any:
     """A figure as it is, or options of `load`."""
     if isinstance(given, Figure):
         return given
@@ -246,7 +246,7 @@ def loaded_person(given: Any) -> Person | None:
     """Whose body a person of a study is; None of a figure that is no person."""
     if isinstance(given, Figure):
         return given.describe().person
-    options = _person(given)
+    options = options_of(given)
     return make_person(**{name: options[name] for name in SIZE if name in options})
 
 
