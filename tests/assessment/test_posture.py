@@ -33,6 +33,11 @@ def test_depth_and_lack_of_clearance(free_bodies):
         assert found.penetration == pytest.approx(max(-distance, 0.0), abs=1e-9)
         assert found.clearance_violation == pytest.approx(max(0.01 - distance, 0.0), abs=1e-9)
         assert found.holds(1e-6) is (distance >= 0.01)
+    assert "deepest overlap 299 mm, distances short by 309 mm" in str(found)
+    q[:3] = 1.5, 0.0, 1.0
+    assert str(wb.assess(wb.Problem(scene, start, goals=[wb.Point("body0", (3.46, 0.0, 1.0))]), q)).startswith(
+        "goals missed by 1960 mm and"
+    )
 
 
 def test_it_does_not_use_what_methods_use(free_bodies, monkeypatch):

@@ -143,6 +143,7 @@ def require_browser() -> None:
         (["show", "human", "--posture", "siting", "--save", "a.html"], ["no posture", "sitting"]),
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),
         (["show", "absent.json"], ["absent.json", "no such file"]),
+        (["figure", "."], ["figure .: is a folder; give a file"]),
         (["figure", "human", "--stature", "175"], ["175", "between"]),
         (["figure", "human", "--age", "175"], ["175", "between 17 and 69"]),
         (["figure", "human", "--proportion", "sitting_height"], ["'sitting_height'", "NAME=METRES"]),

@@ -58,6 +58,32 @@ def test_those_who_do_not_fit_are_told_by_their_dimension() -> None:
     assert sum(map(len, drawn.values())) == 25
 
 
+def between_boards(clearance: float) -> Any:
+    """Somebody who may only step sideways, out of one of two boards that are 0.22 m apart, with the head between."""
+
+    def task(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+        scene, height = wb.Scene(figure), figure.placement(figure.posture("standing"), "gaze").translation[2]
+        for side in (-1.0, 1.0):
+            scene.add(wb.Box((0.6, 0.1, 0.1)), name=f"board {side:g}", at=(0.0, 0.06 + 0.16 * side, height))
+        upright = [wb.Axis("gaze", axis, direction=axis) for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))]
+        level = [wb.Plane("gaze", normal) for normal in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))]
+        held = [wb.Freeze(*figure.joints), *upright, *level]
+        return wb.Problem(scene, "standing", constraints=held, clearance=clearance, balance=False)
+
+    return task
+
+
+def test_who_comes_nearer_than_the_clearance_does_not_fit() -> None:
+    """Heads are 0.14 to 0.18 m broad: 20 to 50 mm are free on each side."""
+    people = wb.people(2, seed=1)
+    assert all(wb.accommodation(between_boards(0.005), people).fits)
+    found = wb.accommodation(between_boards(0.06), people)
+    assert not any(found.fits)
+    for one in found.records:
+        assert one.outcome == "infeasible"
+        assert 0.01 < one.clearance_violation < 0.06
+
+
 def test_the_dimension_that_excludes_is_named_and_not_one_that_goes_with_it() -> None:
     """Half of some women are left out for one dimension, and a little for what is not known of them."""
     people = [{"stature": one["stature"], **one["proportions"]} for one in wb.people(60, "female", seed=3).values()]
@@ -94,6 +120,12 @@ def test_who_is_solved_from_the_own_start_is_counted_where_that_of_another_is_re
     found = wb.accommodation(standing, people, method="ccd")
     assert found.records.counts() == {"solved": 3}
     assert found.share == 1.0
+
+
+def test_people_are_design_cases_by_name_too() -> None:
+    """A woman of the 5th percentile of stature fits under 1.70 m, and a man of the 95th does not."""
+    found = wb.accommodation(upright_under(1.70), {"small": "F5", "tall": "M95"}, sees=(2.0, 0.0, 1.2))
+    assert dict(zip((one.name for one in found.records), found.fits, strict=True)) == {"small": True, "tall": False}
 
 
 def test_those_refused_are_in_no_share() -> None:

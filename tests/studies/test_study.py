@@ -203,6 +203,28 @@ def test_a_function_of_the_figure_alone_is_refused() -> None:
         wb.accommodation(task, wb.people(1))  # type: ignore[arg-type]
 
 
+def test_a_task_of_another_person_than_the_given_one_is_refused() -> None:
+    """Else a task that loads its own figure has one answer for everybody, and accommodates all of them."""
+    everybody = wb.load("human")
+    beside = {"man": everybody}
+
+    def of_one(figure: wb.Figure, target: object, layout: object) -> wb.Problem:
+        return wb.Problem(wb.Scene(everybody))
+
+    def of_two(figure: wb.Figure, target: object, layout: object) -> wb.Problem:
+        return wb.Problem(wb.Scene({**beside, "guest": (figure, (0.0, 2.0, 0.0))}))
+
+    def of_an_arm(figure: wb.Figure, target: object, layout: object) -> wb.Problem:
+        return wb.Problem(wb.Scene(figure.reduced(["right_arm"])))
+
+    with pytest.raises(wb.InputError, match="is of 'human' of another size than the figure that the task was given"):
+        wb.accommodation(of_one, wb.people(1))
+    (refused,) = wb.study(of_one, people=["F5"])
+    assert refused.outcome == "refused"
+    for task in (of_two, of_an_arm):
+        assert wb.study(task, people=["F5"])[0].solved
+
+
 def test_what_was_refused_is_told_with_its_reason() -> None:
     def task(figure: wb.Figure, target: object, layout: object) -> wb.Problem:
         return wb.Problem(wb.Scene(figure), goals=[wb.Point("no such frame", (0.0, 0.0, 1.0))])

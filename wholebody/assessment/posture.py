@@ -20,7 +20,7 @@ from wholebody.assessment.first_order import ACTIVE, MET, Blocker, FirstOrder
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import a, number, posture
-from wholebody.base.errors import InputError, TermError
+from wholebody.base.errors import InputError, TermError, millimetres
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.answers import is_own, limit, one
@@ -78,8 +78,9 @@ class Assessment:
 
     def __str__(self) -> str:
         return (
-            f"goals missed by {1e3 * self.goal_error:.3g} mm and {np.degrees(self.goal_angle):.3g} degrees; "
-            f"deepest overlap {1e3 * self.penetration:.3g} mm, limits off by {self.limit_violation:.3g}, "
+            f"goals missed by {millimetres(self.goal_error)} and {np.degrees(self.goal_angle):.3g} degrees; "
+            f"deepest overlap {millimetres(self.penetration)}, distances short by "
+            f"{millimetres(self.clearance_violation)}, limits off by {self.limit_violation:.3g}, "
             f"constraints by {self.constraint_violation:.3g}"
         )
 

@@ -23,6 +23,11 @@ def one_line(text: str, most: int = SHOWN) -> str:
     return plain if len(plain) <= most else f"{plain[: most - 3]}..."
 
 
+def millimetres(length: float) -> str:
+    """A length [m] in millimetres to three digits, as "1960 mm"."""
+    return f"{float(f'{1e3 * length:.3g}'):g} mm"
+
+
 def either(options: Iterable[str], word: str = "or") -> str:
     """Several options in words: "a", "a or b", "a, b or c"; with another word in place of "or"."""
     *others, last = options

@@ -88,6 +88,7 @@ def show_solution(task: Task, solution: Solution) -> None:
 def judgement(made: Table, judged: Assessment) -> Table:
     """The table with a row for everything that must hold."""
     made.add_row("deepest penetration", f"{1e3 * judged.penetration:.4f} mm")
+    made.add_row("distances, worst shortfall", f"{1e3 * judged.clearance_violation:.4f} mm")
     made.add_row("limits, worst violation", f"{math.degrees(judged.limit_violation):.4f} deg")
     made.add_row("constraints, worst violation", f"{1e3 * judged.constraint_violation:.4f} mm or mrad")
     return made

@@ -12,7 +12,7 @@ from typing import Any
 from wholebody.base import checks
 from wholebody.base.checks import listed, path, shown, text, whole
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.base.files import check_file, is_file
+from wholebody.base.files import check_file, is_file, is_folder
 from wholebody.figures.description import Member
 from wholebody.figures.figure import Figure
 from wholebody.figures.joining import check_single, joined_parts
@@ -60,7 +60,7 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         known, builder = name, builders[name]
     else:
         ending = Path(name).suffix.lower()
-        if not ending and not is_file(name):
+        if not ending and not (is_file(name) or is_folder(name)):
             raise UnknownNameError("figure", name, builders, "load")
         if ending not in ("", ".urdf", ".xml", ".xacro"):
             raise FileFormatError(f"{name}: a figure is a URDF or MJCF file, or 'human', 'avatar', 'hand'; convert it")

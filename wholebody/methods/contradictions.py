@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import millimetres
 from wholebody.geometry.flesh import is_flesh
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -217,7 +218,7 @@ class _Finder:
                     )
                     beyond = float(np.linalg.norm(wanted - root.translation)) - longest
                     if beyond > CLEAR:
-                        text = f"{name}, is {1e3 * beyond:.3g} mm beyond the reach of its joints in one line"
+                        text = f"{name}, is {millimetres(beyond)} beyond the reach of its joints in one line"
                         self.missed[number] = Contradiction("unreachable", text, beyond)
                 longest += float(np.linalg.norm(model.jointPlacements[joint].translation))
                 joint = parent
@@ -243,7 +244,7 @@ class _Finder:
                         deepest, thing = depths[other] + asked, other
             if thing >= 0 and (number not in self.missed or deepest > self.missed[number].least):
                 where = "in" if depths[thing] > 0.0 else "beside"
-                far = f"{1e3 * deepest:.3g} mm from where it can be"
+                far = f"{millimetres(deepest)} from where it can be"
                 text = f"{name}, is {where} {self._workspace.owners[thing]}, at least {far}"
                 self.missed[number] = Contradiction("unreachable", text, deepest)
             if isinstance(goal := self._problem.goals[number], Frame):
@@ -268,7 +269,7 @@ class _Finder:
             least = much / float(np.hypot(1.0, away))
             if much > CLEAR and (number not in self.missed or least > self.missed[number].least):
                 piece, thing = self._workspace.owners[own], self._workspace.owners[other]
-                text = f"{name}, puts {piece} into {thing}, at least {1e3 * much:.3g} mm"
+                text = f"{name}, puts {piece} into {thing}, at least {millimetres(much)}"
                 self.missed[number] = Contradiction("unreachable", text, least)
 
     def _depth(self, index: int, point: Array) -> float:
@@ -313,7 +314,7 @@ class _Finder:
 
     def _report(self, status: Any, name: str, away: float, angle: float, by: str) -> None:
         if max(away, angle) > CLEAR:
-            far = f"{1e3 * away:.3g} mm" if away > CLEAR else f"{np.degrees(angle):.3g} degrees"
+            far = millimetres(away) if away > CLEAR else f"{np.degrees(angle):.3g} degrees"
             by = f"{by}," if "," in by else by  # "constraints[0], Hold('hand')," and "the world"
             self.found.append(Contradiction(status, f"{name}, is {far} from where {by} keeps that part"))
 
@@ -321,8 +322,8 @@ class _Finder:
         owners, joint = self._workspace.owners, self._workspace.table.joint.tolist()
         said = [f"{owners[k]} (kept by {self._fixed[group].by})" if (group := self._group[joint[k]]) in self._fixed
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
-        what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
-        return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are required" if asked else "")
+        what = f"{millimetres(-distance)} inside" if distance < 0.0 else f"{millimetres(distance)} from"
+        return f"{said[0]} is {what} {said[1]}" + (f", where {millimetres(asked)} are required" if asked else "")
 
 
 def _travel(model: pin.Model, joint: int) -> float:

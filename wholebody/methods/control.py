@@ -15,7 +15,7 @@ import numpy as np
 from wholebody.assessment.posture import Assessment
 from wholebody.base.checks import a
 from wholebody.base.compiled import compile_seconds
-from wholebody.base.errors import InputError, UndefinedTermError
+from wholebody.base.errors import InputError, UndefinedTermError, millimetres
 from wholebody.solution import TraceEntry
 
 LONGEST = 4.0
@@ -181,7 +181,7 @@ class Control:
 
 def errors_left(judgement: Assessment) -> str:
     """What is left of the goals' errors, in words."""
-    return f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
+    return f"{millimetres(judgement.goal_error)} and {np.degrees(judgement.goal_angle):.3g} degrees are left"
 
 
 @contextmanager

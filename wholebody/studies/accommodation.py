@@ -22,8 +22,8 @@ from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.studies.many import Running, SolveProgress, run_cases
 from wholebody.studies.populations import people as sampled
-from wholebody.studies.records import CANCELLED, ENDED, REFUSED, Records
-from wholebody.studies.study import TaskFunction, Variant, loaded_person, planned, warn_of_first
+from wholebody.studies.records import CANCELLED, ENDED, HELD, REFUSED, Records
+from wholebody.studies.study import TaskFunction, Variant, loaded_person, options_of, planned, warn_of_first
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
@@ -74,7 +74,7 @@ class Accommodation(Shown):
         sexes: "male" or "female" for each; "" for figures that are no people.
         dimensions: for each person, name to metres (mass: kilograms); empty for figures that are no people.
         reaches: whether each person meets the goals.
-        fits: whether each person does so without overlap and with all constraints.
+        fits: whether each person does so with all distances, limits and constraints kept.
         sees: whether each person sees the point; None where none was given.
         settings: joint of what is adjustable, such as "seat/slide", to its setting for each person, metres or radians;
             NaN for who was refused. Empty where nobody is joined with an adjustable figure.
@@ -229,7 +229,7 @@ def accommodation(
 
     Args:
         task: a task file, or a function, see `study`; its target and layout are None.
-        people: by name, as `wb.people` and `wb.boundary` make them; `wb.people(100)` if left out.
+        people: by name, as `wb.people` and `wb.boundary` make them, or as of `study`; `wb.people(100)` if left out.
         sees: (3,) a point that has to be seen without turning the head, metres; None for none.
         method: name or settings, see `study`; if left out with a function, "qp" with a smaller budget, as neighbours'
             answers are starts. It leaves out the measures where nothing of them is counted, that is, nobody is to see
@@ -253,11 +253,11 @@ def accommodation(
     given = sampled(100) if people is None else people
     if not isinstance(given, Mapping) or not given:
         raise InputError(
-            f"accommodation: people is {checks.shown(people)}; give people by name, such as wb.people(100)"
+            f"accommodation: people is {checks.shown(people)}; give {{name: person, ...}}, such as wb.people(100)"
         )
     who = {name: loaded_person(one) for name, one in given.items()}
     order = sorted(who, key=lambda name: ("", 0.0) if (one := who[name]) is None else (one.sex, one.stature))
-    population = {name: given[name] for name in order}
+    population = {name: options_of(given[name]) for name in order}
     make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
     variants = [Variant(make, person, None, None) for person in population.values()]
     if method is None and callable(task):
@@ -272,11 +272,7 @@ def accommodation(
         raise InputError(f"accommodation: everybody is refused; the first, {records[0].name}: {records[0].message}")
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
     # m, rad: by which limits, constraints and distances may be violated by somebody who fits
-    fits = tuple(
-        one.q is not None
-        and all(missed <= 1e-4 for missed in (one.penetration, one.limit_violation, one.constraint_violation))
-        for one in records
-    )
+    fits = tuple(one.q is not None and all(getattr(one, held) <= 1e-4 for held in HELD) for one in records)
     seen = None
     if point is not None:
         seen = tuple(  # a problem that failed is not made again

@@ -15,13 +15,14 @@ import numpy as np
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.charts import Shown, new_chart, plain, png
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, millimetres
 from wholebody.base.files import checked_target, csv_text, write
 from wholebody.base.records import RecordFile
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
-JUDGED = ("goal_error", "goal_angle", "penetration", "limit_violation", "constraint_violation", "measure")
+HELD = ("penetration", "clearance_violation", "limit_violation", "constraint_violation")
+JUDGED = ("goal_error", "goal_angle", *HELD, "measure")
 
 
 MOST = 100  # rows or columns; letters of more are too small to read
@@ -55,6 +56,7 @@ class SolveRecord:
         goal_error: largest distance that is left, metres.
         goal_angle: largest angle that is left, radians.
         penetration: depth of the deepest overlap, metres.
+        clearance_violation: largest shortfall of a pair from its required distance, metres.
         limit_violation: largest violation of a joint limit, radians or metres.
         constraint_violation: largest violation of a constraint, metres or radians.
         measure: weighted sum of the measures.
@@ -80,6 +82,7 @@ class SolveRecord:
     goal_error: float = 0.0
     goal_angle: float = 0.0
     penetration: float = 0.0
+    clearance_violation: float = 0.0
     limit_violation: float = 0.0
     constraint_violation: float = 0.0
     measure: float = 0.0
@@ -147,7 +150,7 @@ class Records(Shown, Sequence[SolveRecord]):
         seconds = sum(one.seconds for one in self._records)
         placed = [one for one in self._records if one.q is not None]
         worst = max(placed, key=lambda one: one.goal_error, default=None)
-        missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
+        missed = f"{worst.name} by {millimetres(worst.goal_error)}" if worst else "none"
         return (
             f"{len(self)} solve{'' if len(self) == 1 else 's'}: {counts}\n  {seconds:.3g} s of solving\n"
             f"  goal missed most: {missed}{self.remarks()}"

@@ -136,7 +136,7 @@ def planned(
         raise InputError("study: nothing varies; give people, targets or layouts")
     if prod(len(values) or 1 for values in factors) > MOST_CASES:
         raise InputError(f"study: more than {MOST_CASES} cases; give fewer people, targets or layouts")
-    factors[0] = {name: _person(person) for name, person in factors[0].items()}
+    factors[0] = {name: options_of(person) for name, person in factors[0].items()}
     if file is None and any(isinstance(person, Mapping) and "called" in person for person in factors[0].values()):
         raise InputError("study: people have 'called', which names a figure of a task file; the function knows them")
     if file is not None:
@@ -188,7 +188,23 @@ class Variant:
             return self.make(person, self.target, self.layout)
         figure = loaded(_fixed(person)) if isinstance(person, Mapping) else person
         made: Problem = self.make(figure, self.target, self.layout)
+        _check_of(figure, made)
         return made
+
+
+def _check_of(figure: Figure | None, made: Any) -> None:
+    """Refuse a problem of people among whom the one that the task was given is not: all cases would be one body."""
+    given = None if figure is None else figure.describe().person
+    if given is None or not isinstance(made, Problem):
+        return
+    own = made.scene.figure
+    bodies = [one.describe().person for one in (own, *(member.figure for member in own.members.values()))]
+    sizes = {(body.sex, body.stature, body.mass) for body in bodies if body is not None}
+    if sizes and (given.sex, given.stature, given.mass) not in sizes:
+        raise InputError(
+            f"the task's problem is of {own.name!r} of another size than the figure that the task was given; "
+            "pose that one: wb.Scene(figure)"
+        )
 
 
 @lru_cache(maxsize=64)
@@ -205,7 +221,7 @@ def _fixed(person: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
     )
 
 
-def _person(given: Any) -> Any:
+def options_of(given: Any) -> Any:
     """A figure as it is, or options of `load`."""
     if isinstance(given, Figure):
         return given
@@ -230,7 +246,7 @@ def loaded_person(given: Any) -> Person | None:
     """Whose body a person of a study is; None of a figure that is no person."""
     if isinstance(given, Figure):
         return given.describe().person
-    options = _person(given)
+    options = options_of(given)
     return make_person(**{name: options[name] for name in SIZE if name in options})
 
 

@@ -50,7 +50,8 @@ class Axis(GoalOrConstraint):
         frame: name of the frame, segment or joint.
         axis: (3,) the axis in the frame, such as (1, 0, 0); any length.
         direction: (3,) its target direction in the world; any length. One of direction and toward is given.
-        toward: (3,) the point in the world to which it should point from the frame's origin [m].
+        toward: (3,) the point in the world to which it should point from the frame's origin [m]; from nearer than
+            1e-6 m there is no direction, and the error is zero.
         weight: factor on the squared error [1/rad^2].
         basis: (3, 3) rows in the frame: two directions perpendicular to the axis, and the axis, each of length 1.
 
