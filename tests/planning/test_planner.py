@@ -1052,6 +1052,32 @@ def test_a_projection_leaves_what_is_within_the_bounds_of_an_end(planar_arm: Cal
             assert arm.placement(found, "tip").translation[0] == pytest.approx(place[0], abs=2e-5)
 
 
+def test_steps_that_join_two_postures_end_at_the_second(
+    planar_arm: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Steps count as there within 1 mrad, and a shortcut to the end of a path must not displace that."""
+    problem, end = wb.Problem(wb.Scene(planar_arm((0.5, 0.5)))), np.array([1.0, 0.7])
+    monkeypatch.setattr(Geodesics, "joined", lambda *_: [])
+    monkeypatch.setattr(TrackedMotions, "towards", lambda *_: ([0.5 * end, end - 5e-4], True))
+    with problem.borrow() as workspace:
+        slides = TrackedMotions(problem, workspace)
+        slides.admit(problem.start)
+        np.testing.assert_array_equal(slides.joined(problem.start, end, np.inf)[-1], end)
+
+
+def test_what_is_near_at_one_end_alone_is_not_passed_through(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A tip goes past a ball that it overlaps by 1 mm on the way; sweeps count 0.5 mm."""
+    scene = wb.Scene(planar_arm((0.5,))).add(wb.Sphere(0.01), name="ball", at=(0.529, 0.0, 0.0))
+    problem = wb.Problem(scene, np.array([-0.02]), constraints=[Flat()])
+    assert scene.sweep(problem.start, np.array([0.02]), 5e-4) is not None
+    with problem.borrow() as workspace:
+        local = ProjectedMotions(problem, workspace)
+        for q in (problem.start, np.array([1.5])):
+            local.admit(q)
+        assert not local.follows(problem.start, np.array([0.02]))
+        assert local.follows(problem.start, np.array([-0.06]))
+
+
 class Below(wb.Constraint):
     """The tip goes no farther along y than at the start."""
 
@@ -1074,6 +1100,12 @@ class Beside(Below):
     """The tip stays where it is along x."""
 
     lower, axis = np.zeros(1), 0
+
+
+class Flat(Below):
+    """The tip stays in its plane, as all of it does."""
+
+    lower, axis = np.zeros(1), 2
 
 
 def test_projected_steps_stay_on_what_is_held_and_end_where_they_should() -> None:

@@ -220,7 +220,7 @@ def violations(problem: Problem, q: Array) -> Array:
     with all_pairs(problem.scene.built).borrow() as pairs:
         _, _, short = pairs.shortfalls(q, np.broadcast_to(problem.clearances, (len(q), len(problem.clearances))))
         missed = [largest_violation(problem, pairs.state.update(each)) for each in q]
-    return np.maximum.reduce([short, missed, _beyond(problem, q)])
+    return np.asarray(np.array([short, missed, _beyond(problem, q)]).max(axis=0))
 
 
 def _beyond(problem: Problem, q: Array) -> Array:

@@ -26,6 +26,7 @@ from wholebody.terms.linearisation import ConstraintValues
 MARGIN = 2e-3  # m: distance that motions keep beyond the clearance, where their ends do; larger = fewer queries
 NOISE = 1e-5  # m: by which distances of one posture differ from query to query
 MISSED = 5e-5  # m, rad: by which motions may miss clearances and constraints; a frame may by twice as much
+BENT = 4e-4  # m: by which what is near at one end alone may come nearer between two postures; sweeps count 0.5 mm
 INSIDE = 5e-3  # rad, m: by which postures are within the bounds of constraints, where ends are; motions are curved
 
 
@@ -75,6 +76,10 @@ class Geodesics:
         brought = frozenset(pair for term in problem.constraints for pair in term.touching)
         touching = problem.scene.built.between(brought) if brought else np.zeros(len(room), dtype=bool)
         self._least[touching], room[touching] = -MISSED - self.bent, MISSED + self.bent - 2.0 * NOISE
+        self._resting, self._bends = (
+            ~touching,
+            np.where(touching, self.bent, 0.0),
+        )  # near at all ends; by how much nearer
         self._kept = Kept(sides + INSIDE * inwards, room)
         self._followed = Kept(sides - MISSED * inwards, 0.5 * room)
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))
@@ -103,8 +108,18 @@ class Geodesics:
         near = self._workspace.near(q, self._clearance + MARGIN + NOISE)
         number, distance = near.number, near.distance - NOISE
         required = np.minimum((self._least + self._kept.room)[number], distance)
-        # nothing is nearer between two postures than at an end, but for what a frame may miss
-        self._least[number] = np.minimum(self._least[number], distance - MISSED - self.bent)
+        # nothing is nearer between two postures than at an end, but for what a frame may miss; what rests may be
+        beside = np.ones(len(self._least), dtype=bool)
+        beside[number] = False
+        left = self._resting & beside & (self._bends > BENT)
+        self._resting &= ~beside
+        self._least[left] += self.bent - BENT
+        self._kept.room[left] -= self.bent - BENT
+        self._followed.room[left] = 0.5 * self._kept.room[left]
+        self._bends[left], self._bends[self._resting] = BENT, self.bent
+        passing = number[~self._resting[number]]
+        self._bends[passing] = np.maximum(self._bends[passing], min(BENT, self.bent))
+        self._least[number] = np.minimum(self._least[number], distance - MISSED - self._bends[number])
         self._kept.room[number] = required - self._least[number]
         self._followed.room[number] = 0.5 * self._kept.room[number]
         values = self._values.at(self._workspace.state)

@@ -189,7 +189,7 @@ def _postures(problem: Problem, goal: Any) -> list[Array]:
     figure, model, found = problem.scene.figure, problem.scene.model, list[Array]()
     listed = isinstance(goal, Sequence) or (isinstance(goal, np.ndarray) and goal.ndim > 0)
     first = goal[0] if listed and len(goal) and not isinstance(goal, str) else 0.0
-    several = np.ndim(first) > 0 or isinstance(first, (str, Solution))
+    several = isinstance(first, (Sequence, np.ndarray, Solution))
     for k, one in enumerate(goal if several else [goal]):
         q = one.q if isinstance(one, Solution) else figure.posture(one) if isinstance(one, str) else one
         what = f"goal[{k}]" if several else "the goal"

@@ -85,7 +85,7 @@ class ProjectedMotions(Geodesics):
         """See `Geodesics`."""
         super().admit(q)
         self._aims = self._aimed_at()
-        least = np.maximum(self._least + MISSED + self.bent, 0.0)
+        least = np.maximum(self._least + MISSED + self._bends, 0.0)
         self._lineariser.take((), np.minimum(self._lineariser.clearances, least))
 
     def _aimed_at(self) -> Array:

@@ -95,12 +95,12 @@ class Timing:
             over = max(use.velocity, np.sqrt(use.acceleration), use.step)
             if (over <= 1.0 and exact) or not np.isfinite(over):
                 break
-            if over > 3.0 and exact and corrected is not None:  # a correction jumps, however slow all else is
+            if exact and corrected is not None and over > 3.0:  # one jumps, however slow all else is
                 break
             if use.step > 1.0 and 5.0 * (left - BUDGET.left) * over > BUDGET.left:  # frames of which none is judged
                 break
+            slower *= (1.01 if exact else 1.001) * max(over, 1.0)  # corrections differ from timing to timing
             exact = exact or over <= 1.0
-            slower *= 1.001 * max(over, 1.0)
         return q
 
 

@@ -81,7 +81,7 @@ class TrackedMotions:
         if way := self.geodesics.joined(q, target, most):
             return way
         way, met = self.towards(q, target, most)
-        return way if met else []
+        return [*way[:-1], target] if way and met else []  # steps end beside it, and ends of motions stay
 
     def through(self, path: Array) -> list[Array]:
         """See `Geodesics`."""
