@@ -194,14 +194,18 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arm
         yield _moved(problem, state, start, move)
 
 
-def arms_ahead(problem: Problem, state: State, start: Array) -> Iterator[Array]:
-    """The start (nq,) with all arms that reach ahead with level forearms, over a desk; nothing where none does."""
+def arms_ahead(problem: Problem, state: State, start: Array, level: bool = False) -> Iterator[Array]:
+    """The start (nq,) with all arms that reach as in the posture "arms_forward", or with level forearms, over a desk.
+
+    Nothing where no arm reaches.
+    """
     figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
     for body in figure.bodies:
-        level = {f"{body}{side}_{joint}": angle for side in ("left", "right") for joint, angle in LEVEL.items()}
-        if {*level} <= {*figure.joints}:
-            reaching = _reaching(problem, start, body)
-            move[reaching] = pin.difference(figure.model, start, figure.with_joints(start, level))[reaching]
+        angles = {f"{body}{side}_{joint}": angle for side in ("left", "right") for joint, angle in LEVEL.items()}
+        if (name := f"{body}arms_forward") in figure.postures and {*angles} <= {*figure.joints}:
+            q, reaching = figure.posture(name), _reaching(problem, start, body)
+            q = figure.with_joints(q, angles) if level else q
+            move[reaching] = pin.difference(figure.model, start, q)[reaching]
     if move.any():
         yield _moved(problem, state, start, move)
 

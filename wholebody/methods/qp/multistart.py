@@ -106,8 +106,8 @@ class QPMultistart(Search):
 
     def _from_ahead(self) -> Iterator[Array]:
         """Arms that reach, from ahead: hands from below, or led through a desk, end in poorer minima (nq,)."""
-        for q in arms_ahead(self.problem, self.lineariser.state, self._start):
-            yield from chain(self._before_contact(begin=[q]), [q])
+        level, ahead = ([*arms_ahead(self.problem, self.lineariser.state, self._start, each)] for each in (True, False))
+        yield from chain(self._before_contact(begin=ahead), level, ahead)
 
     def _low(self) -> Iterator[Array]:
         """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
