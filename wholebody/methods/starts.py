@@ -203,8 +203,8 @@ def arms_ahead(problem: Problem, state: State, start: Array, level: bool = False
     for body in figure.bodies:
         angles = {f"{body}{side}_{joint}": angle for side in ("left", "right") for joint, angle in LEVEL.items()}
         if (name := f"{body}arms_forward") in figure.postures and {*angles} <= {*figure.joints}:
-            q, reaching = figure.posture(name), _reaching(problem, start, body)
-            q = figure.with_joints(q, angles) if level else q
+            q = figure.with_joints(start, angles) if level else figure.posture(name)
+            reaching = _reaching(problem, start, body)
             move[reaching] = pin.difference(figure.model, start, q)[reaching]
     if move.any():
         yield _moved(problem, state, start, move)
