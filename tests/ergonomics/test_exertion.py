@@ -37,6 +37,21 @@ def test_derivatives_are_those_of_finite_differences(person: wb.Figure, bent: An
     assert wb.check_derivatives(term, wb.Scene(person), bent).agrees
 
 
+@pytest.mark.parametrize("term", [LoadedBalance, StrengthLimit])
+def test_who_would_slip_is_refused(person: wb.Figure, term: Any) -> None:
+    """The ground gives at most 0.8 of what it bears; the median man pushed 700 N by 830 N of weight."""
+    weight = 9.81 * sum(inertia.mass for inertia in person.model.inertias)
+    for share, carried, slips in ((0.79, 0.0, False), (0.81, 0.0, True), (0.81, 20.0, False), (0.79, -20.0, True)):
+        force = wb.Force("left_palm", (0.6 * share * weight, -0.8 * share * weight, -carried))
+        if slips:
+            with pytest.raises(wb.InputError, match="soles slip at"):
+                wb.Problem(wb.Scene(person), constraints=[*FEET, term([force])])
+        else:
+            wb.Problem(wb.Scene(person), constraints=[*FEET, term([force])])
+    sitting = StrengthLimit([wb.Force("left_palm", (-weight, 0.0, 0.0))], standing=False)
+    wb.Problem(wb.Scene(person), constraints=[*FEET, sitting])  # no sole bears
+
+
 def test_torques_are_those_of_inverse_dynamics(person: wb.Figure) -> None:
     # The same on both sides: there the two ways to split the ground's force over the feet are one.
     joints = {"hip_flexion": 0.6, "knee_flexion": 0.8, "ankle_dorsiflexion": 0.2, "elbow_flexion": 1.2}

@@ -31,6 +31,7 @@ AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 TURN = 2.0 * np.pi  # rad: range of those
 YAWS = np.radians((0, 45, -45, 90, -90, 135, -135, 180))
+LEVEL = {"shoulder_flexion": 0.2, "elbow_flexion": 1.8, "elbow_pronation": 1.1}  # rad: of arms with forearms level
 HEADINGS = [pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.zeros(3)) for yaw in YAWS]  # those turned least first
 
 End = TypeVar("End")
@@ -193,13 +194,18 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arm
         yield _moved(problem, state, start, move)
 
 
-def arms_ahead(problem: Problem, state: State, start: Array) -> Iterator[Array]:
-    """The start (nq,) with all arms that reach as in the posture "arms_forward"; nothing where none does."""
+def arms_ahead(problem: Problem, state: State, start: Array, level: bool = False) -> Iterator[Array]:
+    """The start (nq,) with all arms that reach as in the posture "arms_forward", or with level forearms, over a desk.
+
+    Nothing where no arm reaches.
+    """
     figure, move = problem.scene.figure, np.zeros(problem.scene.model.nv)
     for body in figure.bodies:
-        if (name := f"{body}arms_forward") in figure.postures:
+        angles = {f"{body}{side}_{joint}": angle for side in ("left", "right") for joint, angle in LEVEL.items()}
+        if (name := f"{body}arms_forward") in figure.postures and {*angles} <= {*figure.joints}:
+            q = figure.with_joints(start, angles) if level else figure.posture(name)
             reaching = _reaching(problem, start, body)
-            move[reaching] = pin.difference(figure.model, start, figure.posture(name))[reaching]
+            move[reaching] = pin.difference(figure.model, start, q)[reaching]
     if move.any():
         yield _moved(problem, state, start, move)
 

@@ -21,10 +21,11 @@ from wholebody.geometry.placement import steady
 from wholebody.geometry.proximity import Contacts
 from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.footholds import RestLimits
-from wholebody.motion.inverse_dynamics import FRICTION, ROOT, InverseDynamics, Stand, Touches, foot_wrenches
+from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, Stand, Touches, foot_wrenches
 from wholebody.motion.stance import FEET, own_feet, standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.scene.scene import Scene
+from wholebody.tasks.forces import FRICTION
 
 CUTOFF = 6.0
 """Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human

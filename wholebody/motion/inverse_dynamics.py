@@ -22,7 +22,6 @@ from wholebody.tasks.balance import DOWN, convex_polygon
 from wholebody.tasks.surfaces import outermost
 
 ROOT = 6  # degrees of freedom of a free root
-FRICTION = 0.8  # coefficient of friction where none is stated
 LIGHT = 0.2
 """Share of the weight: with less vertical force, in a take-off or landing, the zero moment point says little."""
 

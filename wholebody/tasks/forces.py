@@ -20,6 +20,7 @@ from wholebody.tasks.balance import Balance, Feet, Margin, SolePolygon, standing
 from wholebody.tasks.base import ComputedTogether, filled
 
 GRAVITY = 9.81  # m/s^2, as in Pinocchio's models
+FRICTION = 0.8  # coefficient of friction where none is stated
 
 MOST_FORCE = 1e5  # N: a greater force is a mistake of units
 
@@ -103,6 +104,11 @@ def pressure(
             f"forces lift the figure: {down:.0f} N of its weight are left on the ground; make them smaller"
         )
     f = loads.vectors
+    if (along := float(np.hypot(*f[:, :2].sum(axis=0)))) > FRICTION * down:
+        raise InputError(
+            f"forces push the figure along the ground by {along:.0f} N, and its soles slip at {FRICTION * down:.0f} N, "
+            f"{FRICTION:g} of what they bear; make them smaller"
+        )
     arm = np.einsum("k,ki->i", -f[:, 2], points[:, :2]) + np.einsum("k,ki->i", points[:, 2] - height, f[:, :2])
     turn = np.einsum("k,kij->ij", -f[:, 2], rows[:, :2]) + np.einsum("kj,ki->ij", rows[:, 2] - rises, f[:, :2])
     return (weight * center + arm) / down, (weight * moved + turn) / down

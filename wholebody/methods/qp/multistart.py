@@ -49,7 +49,7 @@ class QPMultistart(Search):
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact, self._seats = list[float](), list[Array]()  # violations from before contact; (nq,) nearer
         self._touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))  # contacts
-        self._through_measure = 0.0  # measures of a posture through things that meets the goals
+        self._ahead, self._through_measure = self._from_ahead(), 0.0  # starts; of what meets the goals through things
         self._doubtful = self.out_of_reach = False  # whether the start may lead lower than a squat; as it seems
 
     def run(
@@ -99,12 +99,15 @@ class QPMultistart(Search):
             return
         self._least = least
         if self.settings.measures and not self._proven():
-            # Hands come from ahead: those that come from below, led by what is met alone, end in poorer minima.
-            ahead = arms_ahead(self.problem, self.lineariser.state, self._start)
-            yield Attempt(self._before_contact(begin=[*ahead]), self.directly, "from before contact")
+            yield Attempt(self._ahead, self.directly, "with arms ahead")
             yield Attempt([self._start], self._without_measures, "")
         elif not self._proven():
             yield from self._attempts_for_feasibility()
+
+    def _from_ahead(self) -> Iterator[Array]:
+        """Arms that reach, from ahead: hands from below, or led through a desk, end in poorer minima (nq,)."""
+        level, ahead = ([*arms_ahead(self.problem, self.lineariser.state, self._start, each)] for each in (True, False))
+        yield from chain(self._before_contact(begin=ahead), level, ahead)
 
     def _low(self) -> Iterator[Array]:
         """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
@@ -116,8 +119,7 @@ class QPMultistart(Search):
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
-        start, least, tried = self._start, self._least, self.tried
-        self._first = len(self.trace)
+        start, least, tried, self._first = self._start, self._least, self.tried, len(self.trace)
         yield Attempt(self._before_contact(grips=True), self._gripping, "from before a grip")
         yield Attempt(self._before_contact(), self._into_contact, "from before contact")
         yield Attempt([start], self._closing, "by feasibility first")
@@ -286,8 +288,8 @@ class QPMultistart(Search):
         starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
         others: Iterable[Array] = ()  # a descent to a contact takes ten times as long: only from poor ones
         if self._touches and not count and self.best.measure > SEARCH.poor_contact:
-            for q in islice(self._before_contact(begin=[*arms_ahead(*given)]), 2):
-                self.accept(self._descend(q), "from before contact")
+            for q in self._ahead:
+                self.accept(self._descend(q), "with arms ahead")
             others = [self._start]  # from there nobody is bent back or astride
         elif not (self._touches or count):
             others = islice(starts, 1, 2)  # half way to the limits

@@ -22,7 +22,6 @@ from wholebody.motion.clip import Clip, between
 from wholebody.motion.clip_torques import CUTOFF, bearing, smoothed
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.inverse_dynamics import (
-    FRICTION,
     LIGHT,
     Derivatives,
     InverseDynamics,
@@ -35,6 +34,7 @@ from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
 from wholebody.scene.scene import Scene
+from wholebody.tasks.forces import FRICTION
 
 LENGTH = 0.1  # metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support
 
