@@ -34,6 +34,7 @@ from wholebody.methods.starts import (
 )
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks.sit import Sit
 
 MUCH = 2 / 3  # share of what the start misses: where postures miss less, few goals are met from the start alone
 
@@ -48,7 +49,8 @@ class QPMultistart(Search):
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact, self._seats = list[float](), list[Array]()  # violations from before contact; (nq,) nearer
-        self._touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))  # contacts
+        self._terms = (*problem.goals, *problem.constraints)
+        self._touches = any(hasattr(term, "touches") for term in self._terms)  # contacts
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self._doubtful = self.out_of_reach = False  # whether the start may lead lower than a squat; as it seems
 
@@ -90,7 +92,7 @@ class QPMultistart(Search):
             self._seats += on if share < SEARCH.nearer else []
             now = now or bool(rests) or share < MUCH
             yield Attempt(on if now else (), self.directly, "from the seat")
-        yield Attempt(() if begin else self._low(), self.directly, "from a squat")
+        yield Attempt(() if begin else self._low(), self._from_low, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
         yield Attempt(() if now else self._seats[:1], self.directly, "from the seat")
         yield Attempt(rests, self.directly, "from the posture of least effort")
@@ -113,6 +115,12 @@ class QPMultistart(Search):
         self._doubtful = share >= MUCH
         for q in squats:
             yield from [*self._before_contact(begin=[q])] or [q]
+
+    def _from_low(self, start: Array) -> LocalSolution:
+        """A descent from a squat; if it ends inside of things, by feasibility first."""
+        if (local := self.directly(start)).violation.worst > self.settings.tolerance:
+            return self.feasibility_first(start) or local
+        return local
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
@@ -230,7 +238,9 @@ class QPMultistart(Search):
     def _to_the_place(self) -> bool:
         """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""
         there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
-        if there is None or self.control.over:
+        # who sits or squats began there: from the start descents end in poorer postures
+        named = self.how == "from a squat" or any(isinstance(term, Sit) for term in self._terms)
+        if there is None or named or self.control.over:
             return False
         tolerance, before = self.settings.tolerance, self.best.measure
         search = Search(there, self.lineariser.workspace, self.solver, self.settings, self.control)
@@ -242,6 +252,12 @@ class QPMultistart(Search):
             self.accept(self._descend(local.q))
         return self.best.measure < SEARCH.moved * before
 
+    def _aside(self, q: Array, seed: int = 0) -> Array:
+        """A posture (nq,) beside another, at random."""
+        figure = self.problem.scene.figure
+        way = np.random.default_rng([self.settings.seed, seed]).normal(0.0, SEARCH.aside, figure.model.nv)
+        return figure.clamp(np.asarray(pin.integrate(figure.model, q, way)))
+
     def _go_on(self) -> None:
         """Descend on where a descent had spent its programs while the measures still decreased."""
         gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
@@ -250,11 +266,20 @@ class QPMultistart(Search):
             gains = self.accept(self._descend(self.best.q)) and self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
-        """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
+        """If contacts are met, descend from beside, at their place and beside a kink; whether it is no minimum."""
+        # Descents from a symmetric posture stay symmetric: of a squat they end at a saddle, from which lunges descend.
         # At a kink two points touch at once; the point that counts as the contact should leave.
         problem, tolerance = self.problem, self.settings.tolerance
         if not (self._touches and self.settings.measures and self.best.violation.worst <= tolerance):
             return False
+        if self.settings.restarts and self.best.measure > SEARCH.poor_contact:
+            ahead = arms_ahead(problem, self.lineariser.state, self._start)
+            for q in islice(self._before_contact(begin=[*ahead]), 2):
+                self.accept(self._descend(q), "from before contact")
+        for seed in range(3):
+            self.accept(local := self._descend(self._aside(self.best.q, seed)))
+            if local.violation.worst <= tolerance or self.control.over:
+                break
         while self._to_the_place():
             pass
         for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
@@ -286,8 +311,6 @@ class QPMultistart(Search):
         starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
         others: Iterable[Array] = ()  # a descent to a contact takes ten times as long: only from poor ones
         if self._touches and not count and self.best.measure > SEARCH.poor_contact:
-            for q in islice(self._before_contact(begin=[*arms_ahead(*given)]), 2):
-                self.accept(self._descend(q), "from before contact")
             others = [self._start]  # from there nobody is bent back or astride
         elif not (self._touches or count):
             others = islice(starts, 1, 2)  # half way to the limits
