@@ -20,7 +20,7 @@ from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
+from wholebody.methods.qp.start_postures import before_contact, posture_apart
 from wholebody.methods.starts import (
     Attempt,
     Minima,
@@ -34,7 +34,6 @@ from wholebody.methods.starts import (
 )
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks.sit import Sit
 
 MUCH = 2 / 3  # share of what the start misses: where postures miss less, few goals are met from the start alone
 
@@ -49,8 +48,7 @@ class QPMultistart(Search):
         self._least = 0.0  # lower bound of the goals' residual, metres
         self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact, self._seats = list[float](), list[Array]()  # violations from before contact; (nq,) nearer
-        self._terms = (*problem.goals, *problem.constraints)
-        self._touches = any(hasattr(term, "touches") for term in self._terms)  # contacts
+        self._touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))  # contacts
         self._through_measure = 0.0  # measures of a posture through things that meets the goals
         self._doubtful = self.out_of_reach = False  # whether the start may lead lower than a squat; as it seems
 
@@ -235,29 +233,6 @@ class QPMultistart(Search):
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
-    def _to_the_place(self) -> bool:
-        """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""
-        there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
-        # who sits or squats began there: from the start descents end in poorer postures
-        named = self.how == "from a squat" or any(isinstance(term, Sit) for term in self._terms)
-        if there is None or named or self.control.over:
-            return False
-        tolerance, before = self.settings.tolerance, self.best.measure
-        search = Search(there, self.lineariser.workspace, self.solver, self.settings, self.control)
-        local = search.directly(self._start)
-        if local.violation.worst > tolerance:
-            local = search.feasibility_first(self._start) or local
-        self.count(search)
-        if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
-            self.accept(self._descend(local.q))
-        return self.best.measure < SEARCH.moved * before
-
-    def _aside(self, q: Array, seed: int = 0) -> Array:
-        """A posture (nq,) beside another, at random."""
-        figure = self.problem.scene.figure
-        way = np.random.default_rng([self.settings.seed, seed]).normal(0.0, SEARCH.aside, figure.model.nv)
-        return figure.clamp(np.asarray(pin.integrate(figure.model, q, way)))
-
     def _go_on(self) -> None:
         """Descend on where a descent had spent its programs while the measures still decreased."""
         gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
@@ -276,8 +251,8 @@ class QPMultistart(Search):
             ahead = arms_ahead(problem, self.lineariser.state, self._start)
             for q in islice(self._before_contact(begin=[*ahead]), 2):
                 self.accept(self._descend(q), "from before contact")
-        for seed in range(3):
-            self.accept(local := self._descend(self._aside(self.best.q, seed)))
+        for share in (1.0, 2.0, 3.0):
+            self.accept(local := self._descend(self._aside(self.best.q, share)))
             if local.violation.worst <= tolerance or self.control.over:
                 break
         while self._to_the_place():
