@@ -20,7 +20,7 @@ from wholebody.methods.qp.search import Search
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
-from wholebody.methods.qp.start_postures import before_contact, posture_apart
+from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
 from wholebody.methods.starts import (
     Attempt,
     Minima,
@@ -251,7 +251,9 @@ class QPMultistart(Search):
             ahead = arms_ahead(problem, self.lineariser.state, self._start)
             for q in islice(self._before_contact(begin=[*ahead]), 2):
                 self.accept(self._descend(q), "from before contact")
-        for share in (1.0, 2.0, 3.0):
+        # fingers that close around a thing take long
+        closes = at_its_place(problem, self.lineariser.state.update(self.best.q)) is None
+        for share in () if closes else (1.0, 2.0, 3.0):
             self.accept(local := self._descend(self._aside(self.best.q, share)))
             if local.violation.worst <= tolerance or self.control.over:
                 break
