@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -33,3 +34,20 @@ def test_a_palm_on_a_table_costs_what_its_place_does() -> None:
     assert solution.assessment.optimality < 1e-2
     other = wb.solve(at_the_place(problem, solution, ["right_palm"]))
     assert other.status != "solved" or solution.assessment.measure < 1.02 * other.assessment.measure + 1e-3
+
+
+@pytest.mark.parametrize(("sex", "percentile"), [("male", 60.0), ("female", 52.5)])
+def test_a_lift_from_the_floor_is_no_saddle(sex: str, percentile: float) -> None:
+    """A squat as in a mirror is stationary: from beside it descents lead to a lunge of three quarters of its effort."""
+    scene = wb.Scene(wb.load("human", sex=sex, percentile=percentile)).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.3, 0.4, 0.3)), name="crate", at=(0.45, 0.0, 0.16))
+    grasps = [wb.Grasp("left", "crate"), wb.Grasp("right", "crate")]
+    measures = [wb.Effort(), wb.tasks.Rhythm(style="free")]
+    problem = wb.Problem(scene, goals=grasps, constraints=[wb.Stand("floor")], measures=measures)
+    solution = wb.solve(problem)
+    assert solution.status == "solved"
+    rng = np.random.default_rng(0)
+    starts = [pin.integrate(scene.model, solution.q, rng.normal(0.0, 0.01, scene.model.nv)) for _ in range(4)]
+    ends = [end for end in wb.methods.QP().minima(problem, starts) if end.status == "solved"]
+    assert ends
+    assert solution.assessment.measure < 1.01 * min(end.assessment.measure for end in ends)

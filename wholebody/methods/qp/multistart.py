@@ -90,7 +90,7 @@ class QPMultistart(Search):
             self._seats += on if share < SEARCH.nearer else []
             now = now or bool(rests) or share < MUCH
             yield Attempt(on if now else (), self.directly, "from the seat")
-        yield Attempt(() if begin else self._low(), self.directly, "from a squat")
+        yield Attempt(() if begin else self._low(), self._from_low, "from a squat")
         yield Attempt(begin or [self._start], self.directly, "directly")
         yield Attempt(() if now else self._seats[:1], self.directly, "from the seat")
         yield Attempt(rests, self.directly, "from the posture of least effort")
@@ -116,6 +116,12 @@ class QPMultistart(Search):
         self._doubtful = share >= MUCH
         for q in squats:
             yield from [*self._before_contact(begin=[q])] or [q]
+
+    def _from_low(self, start: Array) -> LocalSolution:
+        """A descent from a squat; if it ends inside of things, by feasibility first."""
+        if (local := self.directly(start)).violation.worst > self.settings.tolerance:
+            return self.feasibility_first(start) or local
+        return local
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
@@ -229,21 +235,6 @@ class QPMultistart(Search):
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
-    def _to_the_place(self) -> bool:
-        """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""
-        there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
-        if there is None or self.control.over:
-            return False
-        tolerance, before = self.settings.tolerance, self.best.measure
-        search = Search(there, self.lineariser.workspace, self.solver, self.settings, self.control)
-        local = search.directly(self._start)
-        if local.violation.worst > tolerance:
-            local = search.feasibility_first(self._start) or local
-        self.count(search)
-        if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
-            self.accept(self._descend(local.q))
-        return self.best.measure < SEARCH.moved * before
-
     def _go_on(self) -> None:
         """Descend on where a descent had spent its programs while the measures still decreased."""
         gains = self.settings.measures and self.best.violation.worst <= self.settings.tolerance
@@ -252,11 +243,21 @@ class QPMultistart(Search):
             gains = self.accept(self._descend(self.best.q)) and self.best.measure < SEARCH.moved * before
 
     def _descend_again(self) -> bool:
-        """If contacts are met, descend at their place, then from beside a kink; whether the end is not a minimum."""
+        """If contacts are met, descend from beside, at their place and beside a kink; whether it is no minimum."""
+        # Descents from a symmetric posture stay symmetric: of a squat they end at a saddle, from which lunges descend.
         # At a kink two points touch at once; the point that counts as the contact should leave.
         problem, tolerance = self.problem, self.settings.tolerance
         if not (self._touches and self.settings.measures and self.best.violation.worst <= tolerance):
             return False
+        if self.settings.restarts and self.best.measure > SEARCH.poor_contact:
+            for q in self._ahead:
+                self.accept(self._descend(q), "with arms ahead")
+        # fingers that close around a thing take long
+        closes = at_its_place(problem, self.lineariser.state.update(self.best.q)) is None
+        for share in () if closes else (1.0, 2.0, 3.0):
+            self.accept(local := self._descend(self._aside(self.best.q, share)))
+            if local.violation.worst <= tolerance or self.control.over:
+                break
         while self._to_the_place():
             pass
         for share in (0.3, 1.0, 0.1):  # of that step: more leaves more kinks, and comes to other minima
@@ -288,8 +289,6 @@ class QPMultistart(Search):
         starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
         others: Iterable[Array] = ()  # a descent to a contact takes ten times as long: only from poor ones
         if self._touches and not count and self.best.measure > SEARCH.poor_contact:
-            for q in self._ahead:
-                self.accept(self._descend(q), "with arms ahead")
             others = [self._start]  # from there nobody is bent back or astride
         elif not (self._touches or count):
             others = islice(starts, 1, 2)  # half way to the limits

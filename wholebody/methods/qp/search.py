@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain, zip_longest
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
 from wholebody.methods.control import Control
@@ -15,6 +16,7 @@ from wholebody.methods.qp.iterates import LocalSolution, Run, better, broken, he
 from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
+from wholebody.methods.qp.start_postures import at_its_place
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import Multistart, alike, restarts, throughout
 from wholebody.problem import Problem
@@ -22,6 +24,7 @@ from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.checks import is_a
 from wholebody.tasks.defaults import UPRIGHT
+from wholebody.tasks.sit import Sit
 from wholebody.terms.linearisation import Lineariser
 
 
@@ -115,6 +118,37 @@ class Search(Multistart[LocalSolution]):
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
         shared = with_values(self._shared, lineariser=lineariser)
         return Feasibility(shared, self.settings.tolerance, most, note, figure=self.problem.scene.figure)
+
+    def _to_the_place(self) -> bool:
+        """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""
+        there = at_its_place(self.problem, self.lineariser.state.update(self.best.q))
+        terms = *self.problem.goals, *self.problem.constraints
+        # who sits or squats began there: from the start descents end in poorer postures
+        named = self.how == "from a squat" or any(isinstance(each, Sit) for each in terms)
+        if there is None or named or self.control.over:
+            return False
+        tolerance, before = self.settings.tolerance, self.best.measure
+        search = Search(there, self.lineariser.workspace, self.solver, self.settings, self.control)
+        local = search.directly(self._start)
+        if local.violation.worst > tolerance:
+            local = search.feasibility_first(self._start) or local
+        self.count(search)
+        if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
+            self.accept(self._descend(local.q))
+        return self.best.measure < SEARCH.moved * before
+
+    def _aside(self, q: Array, share: float) -> Array:
+        """Beside a posture (nq,): left legs are bent more than right ones; what has no legs is moved at random.
+
+        Lunges to either side are as good: who is much like another is to end as that one does.
+        """
+        figure, far = self.problem.scene.figure, share * SEARCH.aside
+        way = np.zeros(figure.model.nv)
+        for side, sign in (("left_leg", 1.0), ("right_leg", -1.0)):
+            way[figure.dofs([body + side for body in figure.bodies if body + side in figure.groups])] = sign * far
+        if not way.any():
+            way = np.random.default_rng(self.settings.seed).normal(0.0, far, len(way))
+        return figure.clamp(np.asarray(pin.integrate(figure.model, q, way)))
 
     def _closest(self) -> Closest:
         return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)

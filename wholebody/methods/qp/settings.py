@@ -176,6 +176,7 @@ class SearchNumbers(NamedTuple):
     on_its_way: float = 1e-3
     optimal: float = 1e-2  # rad: first-order optimality of a contact's answer from which on it counts as none
     lower: float = 0.9995  # share of a contact's measures below which those at its place are another minimum
+    aside: float = 0.03  # rad, m: from an end, to see whether it is a saddle. More: to other minima; less: slower.
     moved: float = 0.99  # share below which they are looked for again, at the place of that minimum. More: slower.
     # share of what the start misses below which who sits is tried on the seat too. More: in vain of those beside it.
     nearer: float = 0.9
