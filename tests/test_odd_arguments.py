@@ -675,6 +675,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "rotations": np.tile(np.eye(3), (3, 2, 1, 1)), "positions": np.zeros((3, 2, 3)),
     }  # fmt: skip
     yield "SkeletonMotion", Call(wb.motion.SkeletonMotion, moving_skeleton, lambda made: made.rest())
+    yield "SkeletonMotion.resized", Call(skeleton.resized, {"factor": 2.0})
     yield "SkeletonMotion.part", Call(skeleton.part, {"first": 0, "last": 1})
     local = {**moving_skeleton, "local": np.tile(np.eye(3), (3, 2, 1, 1)), "root": np.zeros((3, 3))}
     del local["rotations"], local["positions"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, brief
 from wholebody.base.checks import array as checked_array
-from wholebody.base.checks import instance, listed, settle, text, time_step, whole
+from wholebody.base.checks import instance, listed, number, settle, text, time_step, whole
 from wholebody.base.errors import InputError
 from wholebody.motion.clip import LARGEST
 
@@ -105,7 +105,12 @@ class SkeletonMotion:
         return replace(self, rotations=self.rotations[frames], positions=self.positions[frames])
 
     def resized(self, factor: float) -> SkeletonMotion:
-        """The same motion of a skeleton of which all lengths are multiplied."""
+        """The same motion of a skeleton of which all lengths are multiplied.
+
+        Raises:
+            InputError: the factor is not between 0.0001 and 10,000.
+        """
+        factor = number(factor, "resized: factor", 1e-4, 1e4)
         return replace(self, offsets=factor * self.offsets, positions=factor * self.positions)
 
     @classmethod

@@ -107,7 +107,8 @@ class QPMultistart(Search):
     def _from_ahead(self) -> Iterator[Array]:
         """Arms that reach, from ahead: hands from below, or led through a desk, end in poorer minima (nq,)."""
         level, ahead = ([*arms_ahead(self.problem, self.lineariser.state, self._start, each)] for each in (True, False))
-        yield from chain(self._before_contact(begin=ahead), level, ahead)
+        starts = chain(self._before_contact(begin=ahead), level, ahead) if self._touches else ()
+        yield from self.lineariser.defined(starts)
 
     def _low(self) -> Iterator[Array]:
         """Who balances in a squat, if goals are nearer from there, and in front of what surfaces are to meet (nq,)."""
@@ -119,9 +120,8 @@ class QPMultistart(Search):
 
     def _from_low(self, start: Array) -> LocalSolution:
         """A descent from a squat; if it ends inside of things, by feasibility first."""
-        if (local := self.directly(start)).violation.worst > self.settings.tolerance:
-            return self.feasibility_first(start) or local
-        return local
+        local = self.directly(start)
+        return local if held(local, self.settings.tolerance) else self.feasibility_first(start) or local
 
     def _attempts_for_feasibility(self) -> Iterator[Attempt[LocalSolution]]:
         """Those in which measures do not count."""
@@ -252,10 +252,11 @@ class QPMultistart(Search):
         if self.settings.restarts and self.best.measure > SEARCH.poor_contact:
             for q in self._ahead:
                 self.accept(self._descend(q), "with arms ahead")
-        # fingers that close around a thing take long
-        closes = at_its_place(problem, self.lineariser.state.update(self.best.q)) is None
-        for share in () if closes else (1.0, 2.0, 3.0):
-            self.accept(local := self._descend(self._aside(self.best.q, share)))
+        closes = at_its_place(problem, self.lineariser.state.update(self.best.q)) is None  # fingers: it takes long
+        for q in self.lineariser.defined(
+            self._aside(self.best.q, each) for each in (() if closes else (1.0, 2.0, 3.0))
+        ):
+            self.accept(local := self._descend(q))
             if local.violation.worst <= tolerance or self.control.over:
                 break
         while self._to_the_place():
