@@ -27,7 +27,6 @@ from wholebody.studies.study import TaskFunction, Variant, loaded_person, option
 from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
-BUDGET = 30  # programs of restarts for one person: who is left out takes half of the time of 100
 REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches it
 
 
@@ -231,9 +230,9 @@ def accommodation(
         task: a task file, or a function, see `study`; its target and layout are None.
         people: by name, as `wb.people` and `wb.boundary` make them, or as of `study`; `wb.people(100)` if left out.
         sees: (3,) a point that has to be seen without turning the head, metres; None for none.
-        method: name or settings, see `study`; if left out with a function, "qp" with a smaller budget, as neighbours'
-            answers are starts. It leaves out the measures where nothing of them is counted, that is, nobody is to see
-            and nothing is adjustable: postures are then possible ones, not those that people prefer.
+        method: name or settings, see `study`; if left out with a function, "qp". It leaves out the measures where
+            nothing of them is counted, that is, nobody is to see and nothing is adjustable: postures are then possible
+            ones, not those that people prefer.
         jobs: people at a time.
         folder: keeps the records, see `solve_many`.
         progress: see `study`.
@@ -261,7 +260,7 @@ def accommodation(
     make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
     variants = [Variant(make, person, None, None) for person in population.values()]
     if method is None and callable(task):
-        method = QP(budget=BUDGET, measures=point is not None or _may_have_settings(variants[0]))
+        method = QP(measures=point is not None or _may_have_settings(variants[0]))
     run = partial(Running.checked, "accommodation", jobs=jobs, progress=progress)
     # Who reaches and fits does not depend on how low the measure is: jumps between people are no reason to solve again.
     varied = {"people": population, "targets": None, "layouts": None}
