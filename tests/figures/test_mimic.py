@@ -150,6 +150,19 @@ def test_it_is_solved_swept_tracked_reduced_and_judged(load: Callable[..., wb.Fi
             wb.solve(problem, method="placo")
 
 
+def test_a_follower_that_turns_more_than_once_is_solved_for(load: Callable[..., wb.Figure]) -> None:
+    """Its placement tells its angle but for whole turns: newton took a second turn for a contradiction."""
+    follower = joint("two", "c", "d", follow("one", 4.0, 0.5), "continuous")
+    figure = load(text(joint("one", "a", "b"), joint("own", "b", "c"), follower, joint("last", "d", "e")))
+    scene = wb.Scene(figure)
+    for value in (1.0, 1.9):  # the follower turns by 4.5 and 8.1 rad
+        near, there = (figure.with_joints(figure.neutral, {"one": value, "own": own}) for own in (0.2, 0.3))
+        problem = wb.Problem(scene, near, goals=[wb.Frame("d", figure.placement(there, "d"))])
+        solution = wb.solve(problem, method="newton")
+        assert solution.solved, (value, solution)
+        assert figure.placement(solution.q, "d").isApprox(figure.placement(there, "d"), 1e-4)
+
+
 def test_placo_couples_followers_by_gears(load: Callable[..., wb.Figure]) -> None:
     pytest.importorskip("placo", reason="placo is not installed (the extra placo)")
     figure = load(HAND.replace('offset="0.1"', 'offset="0"'))

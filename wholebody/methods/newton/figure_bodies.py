@@ -110,7 +110,9 @@ class Following(Batch):
 
     def residual(self, x: Array) -> Array:  # noqa: D102
         own, other = (value.residual(x) for value in self._values)
-        return np.asarray(own - self._law.slope * other - self._law.offset)
+        off = np.asarray(own - self._law.slope * other - self._law.offset)
+        # one that follows a few times as far turns more than once
+        return off - 2.0 * np.pi * np.round(off / (2.0 * np.pi)) if isinstance(self._values[0], Angle) else off
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         result = np.zeros((1, 1, self.pattern.shape[1]))
@@ -340,10 +342,9 @@ class FigureBodies:
             )
         basis = pin.Quaternion(axes_with_z(turn[None])[0])
         ends = ((pin.Quaternion(placement.rotation) * basis).coeffs()[None], basis.coeffs()[None])
-        law, index = self.figure.followers.get(model.names[joint]), model.joints[joint].idx_q
+        index = model.joints[joint].idx_q
         middle = 0.5 * (model.lowerPositionLimit[index] + model.upperPositionLimit[index])
         middle = middle if np.isfinite(middle) else 0.0
-        middle = middle if law is None else law.slope * middle + law.offset
         return Angle(bodies, [label], relative_forms(*ends)[:, 2:], np.array([middle]), np.zeros(1), np.ones(1))
 
     def _weight(self) -> Array:
