@@ -139,8 +139,8 @@ class Articulated:
 
     def _inertia(self, q: Array) -> Array:
         """The inertia (nv, nv) of the joints at a posture (nq,): the last one again where that is the same."""
-        if (asked := q.tobytes()) != self._asked:
-            self._asked, self._masses = asked, np.array(pin.crba(self._model, self._data, q))
+        if (asked := q.tobytes()) != self._asked:  # of joints that follow, the other convention adds to the last one
+            self._asked, self._masses = asked, np.array(pin.crba(self._model, self._data, q, pin.Convention.WORLD))
         return self._masses
 
     def _step(self, time: float, aim: Array, steady: Array, moved: Moved, segments: Mapping[str, int]) -> float:
