@@ -50,6 +50,8 @@ def test_who_would_slip_is_refused(person: wb.Figure, term: Any) -> None:
             wb.Problem(wb.Scene(person), constraints=[*FEET, term([force])])
     sitting = StrengthLimit([wb.Force("left_palm", (-weight, 0.0, 0.0))], standing=False)
     wb.Problem(wb.Scene(person), constraints=[*FEET, sitting])  # no sole bears
+    braced = [wb.Force("left_palm", (-weight, 0.0, 0.0)), wb.Force("thorax", (0.5 * weight, 0.0, 0.0))]
+    wb.Problem(wb.Scene(person), constraints=[*FEET, term(braced)])  # by a wall behind
 
 
 def test_torques_are_those_of_inverse_dynamics(person: wb.Figure) -> None:

@@ -76,10 +76,8 @@ class Geodesics:
         brought = frozenset(pair for term in problem.constraints for pair in term.touching)
         touching = problem.scene.built.between(brought) if brought else np.zeros(len(room), dtype=bool)
         self._least[touching], room[touching] = -MISSED - self.bent, MISSED + self.bent - 2.0 * NOISE
-        self._resting, self._bends = (
-            ~touching,
-            np.where(touching, self.bent, 0.0),
-        )  # near at all ends; by how much nearer
+        self._resting = ~touching  # near at all ends
+        self._bends = np.where(touching, self.bent, 0.0)  # m: by how much nearer pairs may come
         self._kept = Kept(sides + INSIDE * inwards, room)
         self._followed = Kept(sides - MISSED * inwards, 0.5 * room)
         unbounded = np.flatnonzero(~np.isfinite(self._approach).all(axis=1))

@@ -107,7 +107,8 @@ def pressure(
     if (along := float(np.hypot(*f[:, :2].sum(axis=0)))) > FRICTION * down:
         raise InputError(
             f"forces push the figure along the ground by {along:.0f} N, and its soles slip at {FRICTION * down:.0f} N, "
-            f"{FRICTION:g} of what they bear; make them smaller"
+            f"{FRICTION:g} of what they bear; make them smaller, add the forces of what holds it, such as a wall "
+            "behind, or leave them to who sits (standing=False)"
         )
     arm = np.einsum("k,ki->i", -f[:, 2], points[:, :2]) + np.einsum("k,ki->i", points[:, 2] - height, f[:, :2])
     turn = np.einsum("k,kij->ij", -f[:, 2], rows[:, :2]) + np.einsum("kj,ki->ij", rows[:, 2] - rises, f[:, :2])

@@ -242,12 +242,13 @@ def test_singular_placements_take_hardly_ever_more_effort_than_a_posture_that_is
     """Of a wrist that is straight, whose last axis is parallel to three others: of 60 five or six did, one does."""
     for name in ("ur5", "ur10"):
         figure, start = known_arm(name)
-        scene, rng, more = wb.Scene(figure), np.random.default_rng(5), 0
+        scene, rng, more = wb.Scene(figure), np.random.default_rng(5), list[bool]()
         for known in rng.uniform(-2.5, 2.5, (60, 6)) * (1, 1, 1, 1, 0, 1):
             problem = wb.Problem(scene, start, goals=[wb.Frame("tool", figure.placement(known, "tool"))])
             if not len(scene.contacts(known, 0.0).number):
-                more += wb.solve(problem).assessment.measure > 1.001 * wb.assess(problem, known).measure
-        assert more <= 1
+                more.append(wb.solve(problem).assessment.measure > 1.001 * wb.assess(problem, known).measure)
+        assert len(more) > 30
+        assert sum(more) <= 1
 
 
 def test_goals_that_hardly_overlap_are_out_of_reach_and_missed_by_no_more_than_what_is_free_beside_them():

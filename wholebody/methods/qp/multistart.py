@@ -250,7 +250,7 @@ class QPMultistart(Search):
         if not (self._touches and self.settings.measures and self.best.violation.worst <= tolerance):
             return False
         if self.settings.restarts and self.best.measure > SEARCH.poor_contact:
-            for q in self._ahead:
+            for q in self._ahead:  # those that were not tried
                 self.accept(self._descend(q), "with arms ahead")
         closes = at_its_place(problem, self.lineariser.state.update(self.best.q)) is None  # fingers: it takes long
         for q in self.lineariser.defined(
