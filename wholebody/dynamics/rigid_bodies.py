@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.checks import TIME_STEP
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, millimetres
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState, Joints
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, Given, bounded, given_placements
@@ -87,7 +87,7 @@ class RigidBodies:
             worst = int(self._near.distance.argmin())
             first, second = (self.names[self._pieces.body[piece]] for piece in self._near.pair[worst])
             raise InputError(
-                f"{first!r} and {second!r} overlap by {-1e3 * self._near.distance[worst]:.3g} mm at the start; "
+                f"{first!r} and {second!r} overlap by {millimetres(-self._near.distance[worst])} at the start; "
                 "move one of them away"
             )
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known, shown
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, millimetres
 from wholebody.base.fields import Range
 from wholebody.figures.population import SEXES, UNITS, population
 from wholebody.figures.sizes import THUMB_TIP, TRUNK, Skeleton, arm_sizes, leg_sizes
@@ -165,7 +165,7 @@ class Person:
             found.append(f"{OVERHEAD} is {own:.3f} m, not {wanted:.3f} m: the shoulder rises as far as it can")
         if self.clothing > 0.03:  # m: up to which named postures are free
             found.append(
-                f"clothing of {1e3 * self.clothing:.3g} mm is so thick that parts may overlap in named postures"
+                f"clothing of {millimetres(self.clothing)} is so thick that parts may overlap in named postures"
             )
         return tuple(found)
 

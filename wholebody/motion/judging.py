@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
+from wholebody.base.errors import millimetres
 from wholebody.figures.model_check import joint_of
 from wholebody.motion.avoider import MethodResult, Work
 from wholebody.motion.checking import ClipCheck, check
@@ -188,12 +189,12 @@ def _collisions(now: ClipCheck) -> list[str]:
     if now.colliding:
         frame = int(np.argmax(now.depth))
         where = f"{_deepest_pair(now, frame, between=False)} at {frame * dt:.2f} s"
-        said.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most: {where}")
+        said.append(f"{now.colliding} frames collide, {millimetres(now.deepest)} deep at most: {where}")
     if now.dips:
         ends = np.maximum(now.depth[:-1], now.depth[1:])
         gap = int(np.argmax(np.where(ends <= now.tolerance, now.between, 0.0)))
         where = f"{_deepest_pair(now, gap, between=True)} from {gap * dt:.2f} s on"
-        said.append(f"{now.dips} motions between frames dip, {1e3 * now.between[gap]:.3g} mm deep at most: {where}")
+        said.append(f"{now.dips} motions between frames dip, {millimetres(now.between[gap])} deep at most: {where}")
     return said
 
 
@@ -209,7 +210,7 @@ def _added(
             fast = now.speeds[0]
             said.append(f"{fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s")
     if terms.beside:
-        away = f"{1e3 * terms.beside:.3g} mm"
+        away = millimetres(terms.beside)
         said.append(f"parts held at each other are too near in the clip: they are held up to {away} beside")
     if loads is not None:
         said.append(str(loads))

@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.lib.stride_tricks import sliding_window_view
 
 from wholebody.base.arrays import Array, Mask, brief
+from wholebody.base.errors import millimetres
 from wholebody.motion.clip_torques import Torques
 
 TORQUE = 0.02
@@ -82,7 +83,7 @@ class LoadChange:
             )
         if self.farther[frame] > PLACE:
             said.append(
-                f"the zero moment point is {1e3 * self.farther[frame]:.3g} mm farther outside of the feet than before "
+                f"the zero moment point is {millimetres(self.farther[frame])} farther outside of the feet than before "
                 f"at {frame * self.after.dt:.2f} s, where {1e3 * PLACE:g} mm are allowed, and too far in "
                 f"{int((self.farther > PLACE).sum())} frames; {self._support(frame)}"
             )
@@ -104,12 +105,12 @@ class LoadChange:
 
     def _support(self, frame: int) -> str:
         """Where the zero moment point of a frame is, and was."""
-        now, was = 1e3 * self.after.outside[frame], 1e3 * (self.after.outside[frame] - self.farther[frame])
+        now, was = self.after.outside[frame], self.after.outside[frame] - self.farther[frame]
         feet = " and ".join(
             name for name, stands in zip(self.after.feet, self.after.stands[frame], strict=True) if stands
         )
-        before = f"{was:.3g} mm" if was > 1e-3 else "within it"
-        return f"it is {now:.3g} mm outside of the support of {feet} there, and was {before} before"
+        before = millimetres(was) if was > 1e-6 else "within it"
+        return f"it is {millimetres(now)} outside of the support of {feet} there, and was {before} before"
 
     def __str__(self) -> str:
         was, now = self.before, self.after

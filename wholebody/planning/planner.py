@@ -19,7 +19,7 @@ from wholebody.assessment.posture import assess, violations
 from wholebody.base import checks
 from wholebody.base.arrays import Array, brief
 from wholebody.base.compiled import compile_all, compile_seconds
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, millimetres
 from wholebody.figures.model_check import joint_of
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
@@ -211,7 +211,7 @@ def _check_end(problem: Problem, q: Array, what: str) -> None:
         )
     if not judged.penetration <= KEPT:
         deepest = [scene.piece_owner[piece] for piece in scene.contacts(q, 0.0).pair[:1].ravel().tolist()]
-        who, depth = " and ".join(deepest) or "things", f"{1e3 * judged.penetration:.3g} mm"
+        who, depth = " and ".join(deepest) or "things", millimetres(judged.penetration)
         raise InputError(f"plan: at {what} {who} overlap by {depth}; give a posture of wb.solve")
     if not judged.constraint_violation <= KEPT:
         state = scene.state(q)

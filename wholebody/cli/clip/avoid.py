@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, millimetres
 from wholebody.base.files import check_writable, checked_target, write
 from wholebody.cli.clip.arguments import (
     figure_of,
@@ -75,7 +75,7 @@ def _tell(avoided: Avoided, written: Path) -> None:
     shown.print(f"[{color}]{escape(report.message)}[/]", highlight=False)
     made = table("", "before", "after")
     made.add_row("frames in collision", str(report.before.colliding), str(report.after.colliding))
-    made.add_row("deepest in a frame", f"{1e3 * report.before.deepest:.3g} mm", f"{1e3 * report.after.deepest:.3g} mm")
+    made.add_row("deepest in a frame", millimetres(report.before.deepest), millimetres(report.after.deepest))
     made.add_row("dips between frames", str(report.before.dips), str(report.after.dips))
     made.add_row("jerk, parts of the original's", "1", f"{report.jerk:.3g}")
     made.add_row("speed, parts of the original's", "1", f"{report.speed:.3g}")

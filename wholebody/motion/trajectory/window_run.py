@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import millimetres
 from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.avoider import Run, followed, kept_beside
 from wholebody.motion.clip import Clip
@@ -142,7 +143,7 @@ class ClipRun:
         missed = ""
         if not best.free:
             dip = f", and {best.dipping} motions between frames dip" if best.dipping else ""
-            missed = f"{1e3 * best.worst:.3g} mm or mrad are missed{dip}"
+            missed = f"{millimetres(best.worst)} or mrad are missed{dip}"
         elif self._time is None and self._loads is None:  # torques come of accelerations: these stay least
             best = self._again(best, own)
         changed = np.abs(best.x).max(axis=1) > 1e-9  # rad, m
