@@ -337,6 +337,26 @@ def test_derivatives_at_a_ring() -> None:
             np.testing.assert_allclose((ahead - behind) / (2.0 * half), given @ way, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("thing", "kind"), [(wb.Torus(0.18, 0.015), "power"), (wb.Box((0.3, 0.3, 0.3)), "palm")], ids=["wheel", "crate"]
+)
+def test_what_a_hand_holds_it_holds_whichever_way_its_figure_turns(thing: wb.Shape, kind: Any) -> None:
+    """Postures that solve a problem keep its grip as their own start: the side is that of the hand, not of the root."""
+    person = wb.load("human")
+    scene = wb.Scene(person).add(thing, name="thing", at=(0.45, 0.0, 1.1))
+    grip = wb.Grasp("left", "thing", kind)
+    held = wb.solve(wb.Problem(scene, goals=[grip]))
+    assert held.status == "solved", held.message
+    place = person.placement(held.q, "left_palm")
+    for degrees in (-55.0, 55.0):
+        ahead = (np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0)
+        goals = [wb.Frame("left_palm", place), wb.Axis("pelvis", (1.0, 0.0, 0.0), direction=ahead)]
+        turned = wb.solve(wb.Problem(scene, held.q, goals=goals, clearance=0.0))
+        assert turned.status == "solved", turned.message
+        assert wb.assess(wb.Problem(scene, held.q, constraints=[grip]), turned.q).constraint_violation < 2e-4
+        assert wb.assess(wb.Problem(scene, turned.q, constraints=[grip]), turned.q).constraint_violation < 2e-4
+
+
 def test_a_wheel_has_no_ends_to_be_along() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.Torus(0.18, 0.015), name="wheel", at=(0.45, 0.0, 1.1))
     with pytest.raises(wb.InputError, match="is a ring"):

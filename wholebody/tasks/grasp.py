@@ -19,7 +19,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Near, Over, Part, owner_pairs
 from wholebody.tasks.faces import face
-from wholebody.tasks.grips import Crossing, Looking, Oblique, Opposing, bar_of, rim_of, rounded
+from wholebody.tasks.grips import Crossing, Looking, Oblique, Opposing, bar_of, holds, rim_of, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, joined, segments_beyond, surface
 from wholebody.tasks.touch import check_apart
 
@@ -43,10 +43,10 @@ class Grasp(ContactTerm):
     - "power": the hand is around a bar: the thing's longest axis crosses the palm, and the hand touches the thing. It
       lies along y, or, where the hand is one segment, up to 20 degrees from y, nearer to the fingers on the thumb's
       side, as handles lie in a fist. A ring, such as a wheel, is held by its rim: anywhere in the quarter on the
-      hand's side, along the tangent there, with the palm outside of it, within 45 degrees. Where the hand has fingers,
-      the two outer parts of each touch the thing too, and the thumb opposes the four fingers; around a bar thinner than
-      23 mm the thumb lies over the fingers, which oppose the palm. One thinner than 16 mm lies in the fingers: its far
-      side is at most 16 mm from the palm.
+      hand's side, turned to the hand if that holds it at the start, along the tangent there, with the palm outside of
+      it, within 45 degrees. Where the hand has fingers, the two outer parts of each touch the thing too, and the thumb
+      opposes the four fingers; around a bar thinner than 23 mm the thumb lies over the fingers, which oppose the palm.
+      One thinner than 16 mm lies in the fingers: its far side is at most 16 mm from the palm.
     - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the figure has such
       segments, otherwise their tips, which have to move apart.
     - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
@@ -62,7 +62,8 @@ class Grasp(ContactTerm):
         thing: what is taken.
         kind: "palm", "power", "pinch" or "fingertips".
         side: (3,) for a palm, direction in the world in which the face looks; by default a left hand takes the face on
-            the figure's left, a right hand that on its right.
+            the figure's left, a right hand that on its right, and one that is at the thing at the start that which its
+            palm looks into.
         opposed: largest angle of two sides from opposite, up to pi, where anything goes [rad].
         along: where the hand is along the thing's longest axis, from -1 at one end to 1 at the other; anywhere but the
             ends if left out. Not for a palm, and not for a ring.
@@ -122,7 +123,7 @@ class Grasp(ContactTerm):
         check_apart(hand, thing, where)
         with scene.figure.posed(start) as state:
             if self.kind == "palm":
-                parts = self._palm(scene, place, hand, state, where)
+                parts = self._palm(scene, place, hand, thing, state, where)
             elif self.kind == "power":
                 parts = self._power(scene, place, hand, thing, state, where)
             else:
@@ -134,8 +135,12 @@ class Grasp(ContactTerm):
             parts.append(Looking(place, up, pi / 4, level=not height))
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 
-    def _palm(self, scene: Scene, place: inputs.Place, hand: Surface, state: State, where: str) -> list[Part]:
+    def _palm(
+        self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
+    ) -> list[Part]:
         outwards = self._outwards(scene, state) if self.side is None else np.asarray(self.side)
+        if self.side is None and holds(hand, thing, state):
+            outwards = -state.frame(place.frame).rotation[:, 2]
         taken = face(scene, self.thing, outwards, state, where)
         facing = Facing(place, across(np.array((0.0, 0.0, 1.0))), taken, np.array((0.0, 0.0, -1.0)))
         return [Gap(hand, taken.surface, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
@@ -143,7 +148,7 @@ class Grasp(ContactTerm):
     def _power(
         self, scene: Scene, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
-        rim = rim_of(thing, place, self._outwards(scene, state), state)
+        rim = rim_of(thing, hand, place, self._outwards(scene, state), state)
         if rim is not None and self.along is not None:
             raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
         bar = bar_of(thing, state, where) if rim is None else rim

@@ -94,8 +94,11 @@ def quarter(middle: Array, across: Array) -> tuple[Array, Array]:
     return (middle + across) / np.sqrt(2.0), (middle - across) / np.sqrt(2.0)
 
 
-def rim_of(thing: Surface, place: Place, outwards: Array, state: State) -> Rim | None:
-    """The rim of a ring for the palm, on its side in a direction (3,); None for no ring."""
+def rim_of(thing: Surface, hand: Surface, place: Place, outwards: Array, state: State) -> Rim | None:
+    """The rim of a ring for the palm, on its side in a direction (3,); None for no ring.
+
+    The side is turned as little as has what a hand holds already: answers at its edge are answers from there too.
+    """
     if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
     shapes = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes)]
@@ -116,10 +119,20 @@ def rim_of(thing: Surface, place: Place, outwards: Array, state: State) -> Rim |
         up = np.array((0.0, 0.0, 1.0))
         level = up - (up @ n) * n
     e = level / np.linalg.norm(level)
+    away = state.frame(place.frame).translation - center
+    turned = float(np.arctan2(away @ cross(n, e), away @ e))
+    if abs(turned) > 0.25 * np.pi and holds(hand, thing, state):
+        rest = turned - np.copysign(0.25 * np.pi, turned)
+        e = np.cos(rest) * e + np.sin(rest) * cross(n, e)
     local = np.array([*quarter(e, cross(n, e)), n]) @ at.rotation
     ring = Face(thing, at.actInv(center), local, np.full(2, radius))
     thick = 0.5 * (_support(shapes, n) + _support(shapes, -n))
     return Rim(ring, place, radius, np.array([thick, thick, radius]))
+
+
+def holds(hand: Surface, thing: Surface, state: State) -> bool:
+    """Whether a hand is at a thing."""
+    return nearest(hand, thing, state).distance < 1e-4  # m: answers may miss contacts by less
 
 
 class Crossing(NamedTuple):
