@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.dynamics.live_world import LiveWorld
+from wholebody.tracking.live import LiveDrag
 from wholebody.tracking.loop import FrameLoop
 
 
@@ -199,9 +201,11 @@ def test_what_belongs_to_a_run_is_neither_pickled_nor_copied(way: Callable[[Any]
     scene = wb.Scene(loaded("hand"))
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
     if method is None:
-        held = [wb.World(scene, dt=0.01), FrameLoop(scene, scene.figure.neutral)]
+        scene.add(wb.Sphere(0.02), name="ball", at=(0.5, 0.0, 0.1), body=wb.Body(mass=1.0))
+        world = wb.World(scene, dt=0.01)
+        held = [world, world.engine, FrameLoop(scene, scene.figure.neutral), LiveWorld(scene)]
     else:
-        held = [method.tracker(problem, 0.01), wb.tracking.Drag(problem)]
+        held = [method.tracker(problem, 0.01), wb.tracking.Drag(problem), LiveDrag(problem)]
     for thing in held:
         with pytest.raises(wb.InputError, match="cannot be pickled or copied"):
             way(thing)

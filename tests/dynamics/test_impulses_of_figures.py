@@ -82,3 +82,24 @@ def test_distances_fall_no_faster_than_the_bound_of_their_pair() -> None:
         assert (falls < bound[before.number] + 0.02).all()
         tight += int((falls > 0.5 * bound[before.number]).sum())
     assert tight > 50  # else the bound says little
+
+
+def test_what_is_lifted_off_a_figure_takes_no_momentum_from_both() -> None:
+    figure, rng = wb.load("avatar"), np.random.default_rng(142)
+    way = rng.normal(size=3) * (1.0, 1.0, 0.3)
+    way /= np.linalg.norm(way)
+    place = np.array((0.0, 0.0, rng.uniform(0.3, 1.5))) + 0.9 * way
+    body = wb.Body(mass=8.4, velocity=-7.4 * way)
+    scene = wb.Scene(figure).add(wb.Box((0.15, 0.1, 0.12)), name="box", at=place, body=body)
+    limp = wb.Actuated(figure, stiffness=0.0, damping=0.0)
+    world = wb.World(scene, figure.posture("standing"), spring=limp)
+    mass = pin.computeTotalMass(figure.model) + 8.4
+
+    def momentum() -> np.ndarray:
+        own = pin.computeCentroidalMomentum(figure.model, figure.model.createData(), world.q, world.velocity)
+        return own.linear + 8.4 * world.engine.twist("box")[:3] + (0.0, 0.0, 9.81 * mass * world.time)  # type: ignore[union-attr]
+
+    began = momentum()
+    for _ in range(10):
+        world.step()
+    assert np.abs(momentum() - began).max() < 1e-8  # it missed 10 mN s of 62 N s

@@ -30,7 +30,7 @@ from wholebody.dynamics.free_motion import Springs, aligning, free_motion
 from wholebody.dynamics.rigid_bodies import GRAVITY, STEP, RigidBodies
 from wholebody.dynamics.sleeping import AFTER, STILL
 from wholebody.dynamics.step_program import SKIN, Impulses
-from wholebody.dynamics.touching import BOUNCE, Touching, undo
+from wholebody.dynamics.touching import BOUNCE, Touching, pushed, undo
 from wholebody.figures.state import free_roots
 from wholebody.scene.scene import Scene
 
@@ -119,6 +119,8 @@ class Articulated:
             back()
             self._slow_for = 0.0
             return False
+        if engine is not None and frame is not None and frame.lent > 0.0:
+            engine.state.slow(pushed(engine, frame), frame.lent)  # what lies still cannot pay
         self.velocity = np.zeros_like(self.velocity)  # its impulses go on as in the frame before
         self.frames, self.ends = [] if frame is None else [frame], [dt]
         return True
@@ -228,10 +230,12 @@ class Articulated:
         frame = engine.advance(time, places.and_others(motions), held, segments, BOUNCE if again else np.inf)
         given = {name: wrench for name, wrench in frame.wrenches.items() if name in segments}
         ways = {name: places.way(name) for name in given}
-        paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time
+        paid = self.energy() + sum(float(wrench @ ways[name]) for name, wrench in given.items()) / time - frame.lent
         late = not again and bool(impacts(frame.events, given, BOUNCE))
         if late or self._react(given, paid, segments, had - engine.energy()):
             undo(engine, frame, unpushed, had - self.energy())
+        elif frame.lent > 0.0 and (over := self.energy() - paid) > 0.0:  # what lies still cannot pay
+            engine.state.slow(pushed(engine, frame), min(over, frame.lent))
         return time, frame, False
 
     def _sunk(self, points: Points, ended: Array, time: float, moved: Mapping[str, pin.SE3]) -> bool:
@@ -381,7 +385,7 @@ class Articulated:
 
         True, and nothing changes, where that would take more energy than is left.
         """
-        if not given:
+        if not given and paid >= self.energy():
             return False
         before, first, inertia = self.velocity, self._model.idx_vs, self._inertia(self.q)
         joints = {name: self._model.frames[segments[name]].parentJoint for name in given}

@@ -88,6 +88,19 @@ class BodiesState:
         kinetic = self._kinetic(bodies)
         self.bodies.twist[bodies] *= np.sqrt(1.0 - energy / kinetic) if energy < kinetic else 0.0
 
+    def pay(self, position: Array, gravity: Array, borne: Indices) -> float:
+        """Take the energy of bodies that were lifted from positions (n, 3) from their velocities; what is lent [J].
+
+        It is lent to what segments that yield bear, by index: these pay, so that the momentum of both stays.
+        """
+        lifted = self.bodies.moving & (self.bodies.position != position).any(axis=1)
+        rise = np.zeros(len(lifted))
+        rise[lifted] = self.pieces.mass[lifted] * ((position - self.bodies.position)[lifted] @ gravity)
+        lifted[borne] = False
+        if (own := float(rise[lifted].sum())) > 0.0:
+            self.slow(lifted, own)
+        return max(0.0, float(rise.sum()) - own)
+
     def _kinetic(self, bodies: Mask) -> float:
         return float(motion_kernel.kinetic(self.bodies, bodies))
 

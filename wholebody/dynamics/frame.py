@@ -56,6 +56,7 @@ class EngineFrame(NamedTuple):
         sleeping: bodies that sleep.
         wrenches: the impulses with their moments about the world's origin, (6,), N s and N m s.
         given: every impulse of what is moved, as an event; the speed of one that is no impact is 0.
+        lent: the part of the work by which things were lifted off segments that yield, which these have to pay, J.
     """
 
     events: tuple[Event, ...]
@@ -70,6 +71,7 @@ class EngineFrame(NamedTuple):
     sleeping: int
     wrenches: Mapping[str, Array]
     given: tuple[Event, ...]
+    lent: float
 
 
 def impacts(events: Sequence[Event], names: Collection[str], speed: float) -> list[Event]:
@@ -93,6 +95,7 @@ class FrameRecord:
     contacts: int = 0
     deepest: float = 0.0
     work: float = 0.0
+    lent: float = 0.0
     signorini: float = 0.0
     coulomb: float = 0.0
     steps: int = 0
@@ -108,7 +111,7 @@ class FrameRecord:
         return EngineFrame(
             tuple(self.events), {names[k]: self.impulse[k, :3] for k in pushed}, self.contacts, self.deepest, energy,
             self.work, self.signorini, self.coulomb, self.steps, sleeping,
-            {names[k]: self.impulse[k] for k in pushed}, tuple(self.given),
+            {names[k]: self.impulse[k] for k in pushed}, tuple(self.given), self.lent,
         )  # fmt: skip
 
 
@@ -132,6 +135,7 @@ def one_frame(frames: Sequence[EngineFrame], ends: Sequence[float]) -> EngineFra
         impulses={name: wrench[:3] for name, wrench in wrenches.items()},
         deepest=max(one.deepest for one in frames),
         work=sum(one.work for one in frames),
+        lent=sum(one.lent for one in frames),
         signorini=max(one.signorini for one in frames),
         coulomb=max(one.coulomb for one in frames),
         steps=sum(one.steps for one in frames),

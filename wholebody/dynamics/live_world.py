@@ -23,6 +23,7 @@ from wholebody.dynamics.world import World
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import NotCopyable
 from wholebody.tasks import Frame, Hold, Point
 from wholebody.tracking.live import LiveFrame
 from wholebody.tracking.live_subjects import LiveProblem, handle_frames, things_of
@@ -32,7 +33,7 @@ RATE = 12.0  # 1/s: of the spring between the mouse and a body
 FASTEST = 3.0  # m/s: a goal that jumps is followed at this speed
 
 
-class LiveWorld:
+class LiveWorld(NotCopyable):
     """The same things to take and move as `LiveDrag`, in a world that does not wait.
 
     Attributes:

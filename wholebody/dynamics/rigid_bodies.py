@@ -29,13 +29,14 @@ from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram, compile
 from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import NotCopyable
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 STEP = 1.0 / 240.0  # s, at most; smaller: more accurate and slower
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 
 
-class RigidBodies:
+class RigidBodies(NotCopyable):
     """The things of a scene that have a `wb.Body`, and everything that they can touch.
 
     Methods raise an `UnknownNameError` for a name that no body has, and an `InputError` for a value of another kind,
@@ -312,8 +313,8 @@ class RigidBodies:
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
         if least < LEAST_GAP:
-            least, lifted = self._separate(least)
-            record.work += lifted
+            least, lifted, lent = self._separate(least)
+            record.work, record.lent = record.work + lifted, record.lent + lent
         record.deepest = max(record.deepest, -least)
 
     @staticmethod
@@ -383,8 +384,8 @@ class RigidBodies:
         """Most that a point of each body (n,) moves in a time, metres."""
         return np.asarray(motion_kernel.travel(self.state.bodies, self._pieces.lever, self.gravity, time))
 
-    def _separate(self, least: float) -> tuple[float, float]:
-        """Part pieces nearer than `LEAST_GAP`; the least distance then, and the energy that was not paid [J]."""
+    def _separate(self, least: float) -> tuple[float, float, float]:
+        """Part pieces nearer than `LEAST_GAP`; the least distance then, the energy that was not paid [J], that lent."""
         state = self.state
         before, position = self.energy(), state.bodies.position.copy()
         for _ in range(4):
@@ -394,7 +395,6 @@ class RigidBodies:
             least = self._find_near(STEP)
             if least >= LEAST_GAP or least < 0.9 * last:  # what is squeezed cannot be parted
                 break
-        gain = self.energy() - before
-        if gain > 0.0:
-            state.slow(state.bodies.moving & (state.bodies.position != position).any(axis=1), gain)
-        return least, max(0.0, self.energy() - before)
+        borne = points.bodies[self._yielding[points.bodies].any(axis=1)]
+        lent = state.pay(position, self.gravity, borne)
+        return least, max(0.0, self.energy() - before), lent

@@ -170,12 +170,17 @@ def undo(engine: RigidBodies, frame: EngineFrame, began: Array, most: float) -> 
         began: (n, 6) the twists of the engine's bodies that weight alone would give them.
         most: energy of the things before, J.
     """
-    things = frozenset(engine.bodies) & frame.wrenches.keys()
-    pushed = np.array([name in things for name in engine.names])
-    for number in np.flatnonzero(pushed).tolist():
+    moved = pushed(engine, frame)
+    for number in np.flatnonzero(moved).tolist():
         name = engine.names[number]
         change = began[number] - engine.twist(name)
         wrench = np.asarray(np.linalg.lstsq(engine.response(name), change, rcond=None)[0], dtype=np.float64)
         engine.push_about_centre(name, wrench)
     if (gain := engine.energy() - most) > 0.0:  # they are not where they would be
-        engine.state.slow(pushed, gain)
+        engine.state.slow(moved, gain)
+
+
+def pushed(engine: RigidBodies, frame: EngineFrame) -> Mask:
+    """Bodies (n,) of the engine that move by themselves and were pushed in a frame."""
+    things = frozenset(engine.bodies) & frame.wrenches.keys()
+    return np.array([name in things for name in engine.names])

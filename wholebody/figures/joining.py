@@ -96,9 +96,8 @@ def mounted_parts(base: Articulated, other: Articulated, frame: int, prefix: str
     chains = {
         name: Chain((*carrying, *one.joints), one.tip) if name in limbs else one for name, one in known.chains.items()
     }
-    person = base.describe().person
     excluded = (*known.excluded, *excluded)
-    description = with_values(known, postures=postures, chains=chains, excluded=excluded, person=person)
+    description = with_values(known, postures=postures, chains=chains, excluded=excluded, person=base.describe().person)
     return model, _geometry(parts, [tested]), description, _visual(parts)
 
 
@@ -263,8 +262,13 @@ def _described(part: _Part) -> Description:
 def _named_cone(joint: JointCone, part: _Part) -> JointCone:
     if joint.reference != "universe":
         return with_values(joint, reference=part.prefix + joint.reference, limb=part.prefix + joint.limb)
-    cone = ReachCone(joint.cone.vertices @ part.turn.T, part.turn @ joint.cone.visible)
-    return with_values(joint, cone=cone, reference=part.seat, limb=part.prefix + joint.limb)
+    return with_values(turned_cone(joint, part.turn), reference=part.seat, limb=part.prefix + joint.limb)
+
+
+def turned_cone(joint: JointCone, turn: Array) -> JointCone:
+    """A cone with its axes in the world turned (3, 3); one with a limb's axes as it is."""
+    cone = ReachCone(joint.cone.vertices @ turn.T, turn @ joint.cone.visible)
+    return with_values(joint, cone=cone) if joint.reference == "universe" else joint
 
 
 def _named_range(part: MotionRange, prefix: str) -> MotionRange:

@@ -9,13 +9,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pinocchio as pin
+
 from wholebody.base import checks
+from wholebody.base.arrays import with_values
 from wholebody.base.checks import listed, path, shown, text, whole
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.base.files import check_file, is_file, is_folder
 from wholebody.figures.description import Member
 from wholebody.figures.figure import Figure
-from wholebody.figures.joining import check_single, joined_parts
+from wholebody.figures.joining import check_single, joined_parts, turned_cone
 from wholebody.geometry.placement import placement
 
 
@@ -148,3 +152,21 @@ def one_figure(figure: object, what: str) -> Figure:
             f"figure.part({name!r}, q), or its clip, clip.part({name!r})"
         )
     return found
+
+
+def stood(figure: Figure, at: pin.SE3, start: Any) -> tuple[Figure, Any]:
+    """A figure whose world is elsewhere, and its start; as in `join` that places a fixed root, or a named posture."""
+    if figure.roots:
+        first = figure.postures[0] if start is None else start
+        return figure, join({"one": (figure, at)}).posture({"one": first})
+    known = figure.describe()
+    model, geometry, visual = pin.Model(figure.model), figure.geometry.copy(), figure.visual.copy()
+    for joint in np.flatnonzero(np.array(model.parents) == 0).tolist()[1:]:
+        model.jointPlacements[joint] = at * model.jointPlacements[joint]
+    for one in (*list(model.frames)[1:], *geometry.geometryObjects, *visual.geometryObjects):
+        if not one.parentJoint:
+            one.placement = at * one.placement
+    model.inertias[0] = at.act(model.inertias[0])
+    cones = {name: turned_cone(cone, at.rotation) for name, cone in known.cones.items()}
+    drawn = None if figure.visual is figure.geometry else visual
+    return Figure(figure.name, model, geometry, figure.detail, with_values(known, cones=cones), drawn), start

@@ -20,6 +20,7 @@ from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.solve import method_for_motions, warn_of_left_out
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.drag import Drag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
@@ -39,7 +40,7 @@ class LiveFrame(NamedTuple):
     path: tuple[tuple[float, Array], ...] = ()  # as in `DragFrame`: the path within the frame, where a thing was moved
 
 
-class LiveDrag:
+class LiveDrag(NotCopyable):
     """A problem whose figure and things are dragged, or an assembly whose bodies and things are.
 
     Constraints of the problem that are not holds stay. Goals of the problem are met again and again while a handle is

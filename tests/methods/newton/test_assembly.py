@@ -472,3 +472,19 @@ def test_a_figure_behind_other_bodies_keeps_its_balance_and_its_ranges() -> None
     q = made.posture("anna")
     assert scene.state(q).frame(scene.frame_id("right_palm")).translation == pytest.approx((0.6, -0.3, 0.6), abs=1e-4)
     assert wb.assess(wb.Problem(scene, start, constraints=kept), q).constraint_violation < 1e-4
+
+
+def test_figures_stand_where_a_scene_has_them(planar_arm) -> None:
+    """A fixed root is placed, and a named posture of a free one; the rest is as where the world of both is."""
+    arm, hand = planar_arm((0.4, 0.3)), wb.load("hand")
+    at = pin.SE3(pin.utils.rotate("x", 0.4) @ pin.utils.rotate("z", 1.0), np.array((0.7, -0.2, 0.4)))
+    made = Assembly().figure("arm", arm, (0.3, 0.2), at=at).figure("hand", hand, "open", at=at)
+    scene = wb.Scene({"arm": (arm, at), "hand": (hand, at)})
+    q = scene.figure.posture({"arm": np.array((0.3, 0.2)), "hand": "open"})
+    for frame in ("arm/tip", "hand/right_index_tip"):
+        assert made.placement(frame).isApprox(scene.figure.placement(q, frame), 1e-12)
+    near, theirs = (np.sort(one.distance) for one in (made.scene.contacts(made.q, 2.0), scene.contacts(q, 2.0)))
+    assert near == pytest.approx(theirs, abs=1e-9)
+    target = at.act(np.array((0.2, 0.5, 0.0)))
+    assert made.point_goal("arm/tip", target).solve().status == "solved"
+    assert made.placement("arm/tip").translation == pytest.approx(target, abs=1e-5)

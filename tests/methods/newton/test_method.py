@@ -13,8 +13,9 @@ import pytest
 
 import wholebody as wb
 from tests.answers import honest
+from wholebody.methods.newton import multistart
 from wholebody.methods.newton.batches import Unit
-from wholebody.methods.newton.feasibility import satisfy
+from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.inequalities import SquaredSlacks
 from wholebody.methods.newton.settings import STARTS
@@ -120,6 +121,19 @@ def test_a_thing_in_the_way_of_a_goal_out_of_reach_is_gone_round_by_other_starts
     assert alone.assessment.goal_error > np.hypot(3.0, 0.1) - 0.6
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error == pytest.approx(np.hypot(3.0, 0.1) - 0.7, abs=1e-4)
+
+
+def test_steps_that_end_far_from_a_minimum_do_not_call_a_goal_unreachable(planar_arm, monkeypatch) -> None:
+    """So they ended with joints that follow others: within 26 mm of a goal of a Panda's, optimality 1e-2."""
+
+    def ended(*given: Any, iterations: int, **more: Any) -> FeasibilityResult:
+        return satisfy(*given, iterations=min(iterations, 1), **more)._replace(stationary=True)
+
+    monkeypatch.setattr(multistart, "satisfy", ended)
+    problem = wb.Problem(wb.Scene(planar_arm((0.4, 0.3))), (0.5, 0.5), goals=[wb.Point("tip", (-0.3, -0.4, 0.0))])
+    solution = wb.methods.Newton(restarts=0).solve(problem)
+    assert solution.assessment.optimality > 1e-2
+    assert solution.status == "stalled"
 
 
 def test_frozen_joints_stay(human: wb.Figure) -> None:

@@ -13,7 +13,7 @@ from wholebody.base.checks import color as checked_color
 from wholebody.base.checks import instance, known, numbers, shown, text
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.loading import one_figure
+from wholebody.figures.loading import one_figure, stood
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import LENGTH, Shape
@@ -116,6 +116,7 @@ class AssemblyBodies:
         figure: Figure,
         start: Any = None,
         *,
+        at: PlacementLike | None = None,
         constraints: Iterable[Constraint | Bound] = (),
         color: Sequence[float] | str | None = None,
     ) -> Self:
@@ -128,6 +129,7 @@ class AssemblyBodies:
             name: one that no body and no other figure has.
             figure: such as `wb.load("human")`.
             start: (nq,) posture, or the name of one of the figure's; None for its first posture.
+            at: where its world is, as of `wb.Scene`: that places a fixed root, and a named posture of a free one.
             constraints: of it, such as `wb.Hold("left_foot")` and `wb.Balance()`, or of a class of your own.
             color: of its pieces.
 
@@ -137,6 +139,8 @@ class AssemblyBodies:
         self._check_new(text(name, "the name of a figure"), "figure")
         one_figure(figure, f"figure {name!r}")
         painted = None if color is None else checked_color(color, f"figure {name!r}: color")
+        if at is not None:
+            figure, start = stood(figure, placement(at, f"figure {name!r}: at"), start)
         # The other bodies may carry it, so it is not taken for one that stands.
         problem = Problem(Scene(figure), start, constraints=constraints, range_of_motion=False, balance=False)
         part = AssemblyFigure(name, problem, len(self._places))
