@@ -129,7 +129,7 @@ def test_questions_to_one_scene_are_answered_as_to_one_thread(scene: wb.Scene) -
             None if met is None else (met.fraction, met.q.tolist(), met.pair),
             wb.assess(problem, postures[k]),
             scene.state(postures[k]).frame(scene.frame_id("head")).homogeneous.tolist(),
-            [(one.a, one.b, one.separation.tolist()) for one in scene.penetration(postures[k])],
+            [(one.a, one.b, one.global_depth.tolist()) for one in scene.penetration(postures[k])],
         )
 
     alone = [asked(k) for k in range(len(postures))]

@@ -11,21 +11,21 @@ from tests.csv_rows import csv_rows
 from wholebody.bench import plot_style
 from wholebody.bench.measure.track import VARIANTS
 from wholebody.bench.rows import Panel, chart, shares
-from wholebody.bench.suite.adapters.registry import adapters, stepping
+from wholebody.bench.suite.adapters.registry import STEPPING, adapters
 
 
 def test_step(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     reaches = VARIANTS[1:2]
     monkeypatch.setattr("wholebody.cli.bench.measurements.VARIANTS", reaches)
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
-    words = ("--repeats", "1", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
+    words = ("--repeats", "1", "--steps", "6", "--tools", "wholebody/retarget", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words) == 0
     rows = csv_rows(tmp_path / "out" / "step-time.csv")
-    each = [(reach, tool) for reach in reaches for tool in ("wholebody/daqp", "placo", "Pinocchio and coal")]
+    each = [(reach, tool) for reach in reaches for tool in ("wholebody/retarget", "placo", "Pinocchio and coal")]
     assert [(row["case"], row["tool"]) for row in rows] == each
     for row in rows:
         assert 0.0 < float(row["median µs"]) <= float(row["p95 µs"])
-        ours = row["tool"] == "wholebody/daqp"
+        ours = row["tool"] == "wholebody/retarget"
         assert not ours or float(row["median × Pinocchio and coal"].split()[0]) > 1.0
         assert row["tool"] != "placo" or float(row["median × placo"]) == float(row["p95 × placo"]) == 1.0
     for row in csv_rows(tmp_path / "out" / "step-result.csv"):
@@ -64,7 +64,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
-    assert {name.replace("wholebody", "qp") for name in stepping()} <= set(plot_style.STYLE["methods"])
+    assert {name.replace("wholebody", "qp") for name in STEPPING} <= set(plot_style.STYLE["methods"])
     assert plot_style.method_style("qp") == plot_style.method_style("wholebody")  # the same method in another chart
     colors = [color for color, _ in plot_style.STYLE["methods"].values()]
     assert len(set(colors)) == len(colors)

@@ -70,7 +70,7 @@ class Scene(SceneContents):
             return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
-        """Depth of overlap of owners (segments, objects) at q (nq,): PD_g and the least separating translation.
+        """Depth of overlap of owners (segments, objects) at q (nq,): PD_g and the deepest pair.
 
         The deepest first; empty if nothing overlaps. The pairs are those of `overlapping`.
         """
@@ -78,10 +78,7 @@ class Scene(SceneContents):
 
         self._warn_of_angles(q, "penetration: q")
         with self.borrow() as workspace:
-            near = self.overlapping(q, workspace)
-            return object_penetrations(
-                workspace.geometry, near.placements, workspace.owners, near.pair, workspace.table.pairs
-            )
+            return object_penetrations(self.overlapping(q, workspace), workspace.owners)
 
     def overlapping(self, q: Array, workspace: Workspace | None = None) -> Contacts:
         """Every pair of pieces that overlap at the posture q, shape (nq,), the deepest first.

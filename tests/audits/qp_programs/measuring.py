@@ -16,8 +16,7 @@ from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import quantile, share
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
-from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
-from wholebody.methods.qp.solvers.registry import make_solver
+from wholebody.methods.qp.solvers.registry import ActiveSetSolver, make_solver
 
 
 class Residuals(NamedTuple):
@@ -52,8 +51,8 @@ def measure(
 
     The own error is how far the solver's own answer is from the exact one [rad, m]; nan where it has none.
 
-    A case's programs are solved in the order in which they were posed, by a solver that is made for the case and keeps
-    its workspace, as in a solve. It is set up, and that is not counted, by the last program of the case.
+    A case's programs are solved in the order in which they were posed, by a solver that is made for the case, as in a
+    solve. It is set up, and that is not counted, by the last program of the case.
     """
     rows: list[Row] = []
     done = ""
@@ -151,8 +150,8 @@ def qp_report(rows: Sequence[Row], totals: Sequence[Row], facts: Mapping[str, st
     most = ", ".join(f"{name} {max(row[name] for row in rows):.0e}" for name in Residuals._fields)
     about = (
         f"{len(first)} programs of {len({row['set'] for row in first})} problem sets; sizes in the median: {sizes}. "
-        "Every solver alone, without a hot start, in turning order; its workspace lives as long as a case. Times "
+        "Every solver alone, without a hot start, in turning order. Times "
         "include the correction of the active set. *Own answer off by* is how far the solver's answer was from the "
-        f"exact one before its active set was corrected: OSQP is stopped early. Largest residuals of answers: {most}."
+        f"exact one before its active set was corrected. Largest residuals of answers: {most}."
     )
     return tables_of(about, {"": totals}, facts)

@@ -73,17 +73,6 @@ def test_every_solver_gives_the_same_answer(random_program, name):
         assert program.optimality(answer.x) < 1e-7  # weights of 1e10 leave so much rounding
 
 
-def test_osqp_workspace_lives_through_changing_sizes(random_program):
-    """One solver for programs that grow and shrink says what a new one says."""
-    rng = np.random.default_rng(8)
-    solver = make_solver("osqp")
-    for rows in (0, 3, 8, 9, 30, 2, 0, 17):
-        for n, m in ((12, 4), (12, 4), (7, 4), (12, 2)):
-            program = random_program(rng, n, m, rows)
-            expected = make_solver("osqp").solve_cold(program).x
-            assert solver.solve_cold(program).x == pytest.approx(expected, abs=1e-9)
-
-
 def test_the_active_set_of_an_answer_leads_to_it(random_program):
     rng = np.random.default_rng(9)
     solver = make_solver("active_set")

@@ -16,7 +16,6 @@ from wholebody.bench.measure.track import SETTING, Track, Verdict, judge
 from wholebody.bench.rows import Figure, Panel, Row, across, only, quiet, report, shares, texts, times
 from wholebody.bench.statistics import BLOCK, quantile_ratio
 from wholebody.bench.suite.adapters.base import Tool
-from wholebody.bench.suite.adapters.own import RETARGET
 from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.bench.tables import programs_text
 from wholebody.geometry.pair_distances import PairDistances
@@ -199,11 +198,7 @@ def step_report(
         clearance_mm=1e3 * SETTING.clearance, within_mm=1e3 * SETTING.within, joint_speed=SETTING.joint_speed,
         root_speed=SETTING.root_speed, root_turn=SETTING.root_turn, least=LEAST,
     )  # fmt: skip
-    # Our method has the same answers with other QP solvers, whose times are in the CSV file.
-    shown = [row for row in judged if not row.tool.startswith("wholebody/") or row.tool.endswith(f"/{RETARGET}")]
-    judged = shown or judged
     met = [row for row in judged if not row.case.endswith("alone")]  # where something is in the way
-    spent = [row for row in spent if row.tool in {LEAST, *(other.tool for other in judged)}]
     figures_of_time = "median µs", f"median × {REFERENCE}", f"p95 × {REFERENCE}", f"median × {LEAST}"
     figures_of_steps = (
         "least distance mm",

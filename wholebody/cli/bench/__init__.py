@@ -27,7 +27,7 @@ cases in parallel by joblib, --cluster on a dask cluster.""",
             listed("--sets", "problem sets (default: all)"),
             listed(
                 "--methods",
-                "methods, such as qp, newton or qp/daqp; all for every method (default: one of each algorithm, from "
+                "methods, such as qp, newton or ccd; all for every method (default: one of each algorithm, from "
                 "one start and from several; with --quick with their usual starts)",
             ),
             count("--cases", None, "problems of each set (default: 200)"),
@@ -84,7 +84,7 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
             "honest best effort, a clear refusal, or WRONG.",
             listed(
                 "--methods",
-                "methods, such as qp, newton or qp/daqp; all for every one (default: one of each algorithm)",
+                "methods, such as qp, newton or ccd; all for every one (default: one of each algorithm)",
             ),
             listed("--cases", "cases (default: all; with --quick a few)"),
             count("--jobs", 1, "processes at a time"),

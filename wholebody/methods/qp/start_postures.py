@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, cross, with_values
 from wholebody.figures.state import State
-from wholebody.geometry.penetration import global_depth, least_separation
+from wholebody.geometry.penetration import global_depth, way_out
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.feasibility import Feasibility
@@ -163,9 +163,8 @@ def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | N
     """A posture (nq,) that separates objects whose normals cancel at q; None if none cancel or none separates them.
 
     Rows of two pieces of one segment that overlap one thing from opposite sides add up to nothing, and no descent
-    leaves, although a translation does: the least that separates all pieces of the two
-    (`wholebody.geometry.penetration`; figure 4b of Schmidl and Lin, "Real-time physically-based interaction between
-    avatars and virtual environments").
+    leaves, although a translation does (`wholebody.geometry.penetration.way_out`; figure 4b of Schmidl and Lin,
+    "Real-time physically-based interaction between avatars and virtual environments").
     """
     near = workspace.near(q, 0.0)
     for group in _groups(workspace, near):
@@ -173,7 +172,7 @@ def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | N
         push = global_depth(depth, near.normal[group.rows])
         # of pieces that overlap; more take longer to separate than other starts
         if float(np.linalg.norm(push)) <= CANCELLED * float(depth.max()) and len(group.rows) <= 16:
-            way = _separation(workspace, near, group.owners)
+            way = _way_out(workspace, near, group)
             if way is not None:
                 return _moved(problem, workspace, q, group.joints, way)
     return None
@@ -190,18 +189,15 @@ def _groups(workspace: Workspace, near: Contacts) -> list[_Group]:
     return [_Group(key[:2], key[2:], rows) for key, rows in found.items() if len(rows) > 1]
 
 
-def _separation(workspace: Workspace, near: Contacts, owners: tuple[str, str]) -> Array | None:
-    """Least translation (3,) of the first owner's pieces out of the second's, with some room; None if there is none."""
-    pieces = workspace.geometry.geometryObjects
-    both = [[k for k, owner in enumerate(workspace.owners) if owner == name] for name in owners]
-    tested = {(a, b) for a, b in workspace.table.pairs.tolist()}
-    allowed = np.array([[(a, b) in tested or (b, a) in tested for b in both[1]] for a in both[0]])
-    placed = [
-        [(pieces[k].geometry, pin.SE3(near.placements[k, :3].T, near.placements[k, 3])) for k in of] for of in both
-    ]
-    way = least_separation(placed[0], placed[1], allowed)
-    length = float(np.linalg.norm(way.translation))
-    return way.translation * (1.0 + ROOM / length) if way.separated and length > 0.0 else None
+def _way_out(workspace: Workspace, near: Contacts, group: _Group) -> Array | None:
+    """A short translation (3,) of the first owner out of the second, with some room; None if there is none."""
+    table = workspace.table
+    first, second = (np.array([owner == name for owner in workspace.owners]) for name in group.owners)
+    a, b = table.pairs.T
+    pairs = table.pairs[(first[a] & second[b]) | (second[a] & first[b])]
+    normal = near.normal[group.rows[0]]
+    way = way_out(workspace.geometry, near.placements, pairs, np.flatnonzero(first), normal)
+    return None if way is None else way * (1.0 + ROOM / float(np.linalg.norm(way)))
 
 
 def _moved(problem: Problem, workspace: Workspace, q: Array, joints: tuple[int, int], way: Array) -> Array:

@@ -50,7 +50,6 @@ class QPTracker(SolvingTracker):
             InputError: dt is not a positive finite number.
         """
         super().__init__(method, problem, dt)
-        solver.load()  # not in the middle of a drag
         compiled_kernel()
         self._working_set, self._query_distance = WorkingSet(solver), TRACKING.least_within
         self._alone = OneAtATime("tracker")

@@ -136,7 +136,7 @@ def test_objects_that_moved_are_where_they_are_now(adapter: Adapter, planar_arm:
 def test_unknown_and_missing_adapters_are_named() -> None:
     with pytest.raises(UnknownNameError, match="qp/osqp"):
         adapters(["qp/osqq"])
-    assert [adapter.name for adapter in adapters(["ccd", "qp/daqp"])] == ["ccd", "qp/daqp"]
+    assert [adapter.name for adapter in adapters(["ccd", "qp/osqp"])] == ["ccd", "qp/osqp"]
     assert [adapter.name for adapter in adapters(["newton", "newton/kkt"])] == [
         "newton/slack", "newton/barrier", "newton/kkt",
     ]  # fmt: skip

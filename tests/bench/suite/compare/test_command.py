@@ -20,11 +20,11 @@ run = partial(bench, "compare")
 def test_two_methods_on_one_problem(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ("--quick", "--cases", "1", "--sets", "robot_arm", "--methods", "qp/daqp", "dls", "--out", str(tmp_path))
+    words = ("--quick", "--cases", "1", "--sets", "robot_arm", "--methods", "qp/osqp", "dls", "--out", str(tmp_path))
     assert run(*words) == 0
     assert "report.html" in capsys.readouterr().out
     assert "# cases beside each other: 1 on this machine\n" in (tmp_path / "solves.csv").read_text()
-    assert {row["method"] for row in csv_rows(tmp_path / "solves.csv")} == {"qp/daqp", "dls"}
+    assert {row["method"] for row in csv_rows(tmp_path / "solves.csv")} == {"qp/osqp", "dls"}
     assert "Robot arm" in (tmp_path / "report.html").read_text()
     with pytest.raises(InputError, match=r"holds a run with seeds = \[0, 1, 2\], and \[3, 4, 5\] is asked for"):
         run(*words, "--seed", "3")
@@ -35,7 +35,7 @@ def test_two_methods_on_one_problem(
     first, again = (read_lock(folder / "lock.json") for folder in (tmp_path, tmp_path / "again"))
     assert again.amounts == first.amounts
     assert {one for one in again.figures if one[2] == "solved"} == {
-        ("robot_arm", name, "solved") for name in ("qp/daqp", "dls")
+        ("robot_arm", name, "solved") for name in ("qp/osqp", "dls")
     }
 
 

@@ -1,4 +1,4 @@
-"""Our own methods as they take part: qp with every QP solver, newton in three variants, ccd and dls."""
+"""Our own methods as they take part: qp, newton in three variants, ccd and dls."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from wholebody.tasks.base import Goal, filled
 from wholebody.tasks.frame import point_rows
 
 RETARGET = "retarget"
-"""In place of a solver: a new `Point` and `Problem.retarget` at each step, where others move a target in place."""
+"""The tool with a new `Point` and `Problem.retarget` at each step, where the other moves a target in place."""
 
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
@@ -33,16 +33,9 @@ NEWTONS: dict[str, dict[str, Any]] = {
 """The variants of newton, as arguments of `Newton`."""
 
 
-def qp_settings(solver: str) -> dict[str, Any]:
-    """The settings of an method: as it comes for "", active sets throughout, else every program by that solver."""
-    if not solver:
-        return {}
-    return {"solver": solver} if solver == "active_set" else {"solver": solver, "hot_start": False}
-
-
-def qp_adapter(solver: str) -> Adapter:
-    """The QP method as it comes for "", else with the settings of `qp_settings`."""
-    settings = qp_settings(solver)
+def qp_adapter(solver: str = "") -> Adapter:
+    """The QP method as it comes, or with every program by a solver."""
+    settings = {"solver": solver, "hot_start": False} if solver else {}
     exact = (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
     return Adapter(
         name=f"qp/{solver}" if solver else "qp",
@@ -54,7 +47,7 @@ def qp_adapter(solver: str) -> Adapter:
 def one_start(family: str) -> Adapter:
     """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
     known: dict[str, tuple[Adapter, Callable[..., Method]]] = {
-        "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0)),
+        "qp": (qp_adapter(), partial(QP, budget=0, restarts=0)),
         "newton": (newton_adapter("slack"), partial(wb.methods.Newton, restarts=0)),
         "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0)),
     }
@@ -131,13 +124,12 @@ def reach_problem(track: Track, goal: Goal) -> wb.Problem:
 class OwnTool(Tool):
     """One program a step, with the workspace of the step before."""
 
-    def __init__(self, track: Track, solver: str = "") -> None:
-        """State the problem; the solver is one of `qp_settings`, or `RETARGET` for a goal that is replaced."""
-        self.name, self._tip = f"wholebody/{solver}" if solver else "wholebody", track.tip
-        self._moved = None if solver == RETARGET else MovingPoint(track.tip, np.array(track.targets[0]))
+    def __init__(self, track: Track, name: str) -> None:
+        """State the problem; a name that ends in `RETARGET` is for a goal that is replaced."""
+        self.name, self._tip = name, track.tip
+        self._moved = None if name.endswith(RETARGET) else MovingPoint(track.tip, np.array(track.targets[0]))
         self.problem = reach_problem(track, self._moved or wb.Point(track.tip, track.targets[0]))
-        solver = "" if solver == RETARGET else solver
-        self._tracker = wb.methods.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
+        self._tracker = wb.methods.QP().tracker(self.problem, SETTING.dt)
         self._q = np.array(track.start)
         self._told: list[QPStep] = []
 

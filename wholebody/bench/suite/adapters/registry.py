@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from inspect import signature
@@ -27,7 +27,6 @@ from wholebody.bench.suite.adapters.own import (
 )
 from wholebody.bench.suite.adapters.starts import ONE, STARTS, restarted
 from wholebody.methods.base import Method
-from wholebody.methods.qp.solvers.registry import solver_names
 from wholebody.methods.solve import imported
 
 
@@ -94,12 +93,7 @@ def missing() -> Mapping[str, str]:
 
 
 def _rows() -> dict[str, _Row]:
-    rows = {f"qp/{solver}".removesuffix("/"): _Row(partial(qp_adapter, solver))
-            for solver in ("", "active_set", "osqp", "daqp")}  # fmt: skip
-    for solver, need in _texts()["solvers"].items():
-        rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver), (need,), "solvers")
-    for solver in solver_names():  # any other that qpsolvers finds on this machine
-        rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver)))
+    rows = {"qp": _Row(qp_adapter), "qp/osqp": _Row(partial(qp_adapter, "osqp"))}
     rows |= {f"newton/{way}": _Row(partial(newton_adapter, way)) for way in NEWTONS}
     rows |= {"ccd": _Row(ccd_adapter), "dls": _Row(dls_adapter)}
     outside = {name: said for name, said in _texts().items() if "extra" in said}
@@ -139,27 +133,23 @@ def _made(kind: Callable[..., Method], known: frozenset[str], tolerance: float, 
 
 
 def _described(name: str, build: Callable[[], Adapter]) -> Adapter:
-    """An adapter with its texts; those of a QP solver have its name in place of SOLVER."""
-    said = _texts()[name if name in _texts() else "qp/SOLVER"]
-    setup = said["setup"].replace("SOLVER", name.rpartition("/")[2])
-    return replace(build(), setup=setup, differences=tuple(said.get("differences", ())))
+    """An adapter with its texts."""
+    said = _texts()[name]
+    return replace(build(), setup=said["setup"], differences=tuple(said.get("differences", ())))
 
 
 def _texts() -> dict[str, Any]:
     return packaged_toml(Path(__file__).with_name("adapters.toml"))
 
 
-@cache
-def stepping() -> tuple[str, ...]:
-    """Every tool that follows reaches: an adapter, of which qp is called wholebody here."""
-    ours = (f"wholebody/{solver}" for solver in ("active_set", "osqp", "daqp", *_texts()["solvers"]))
-    return "wholebody", f"wholebody/{RETARGET}", *ours, "placo", "placo/pruned", "pink", "mink"
+STEPPING = ("wholebody", f"wholebody/{RETARGET}", "placo", "placo/pruned", "pink", "mink")
+"""Every tool that follows reaches: an adapter, of which qp is called wholebody here."""
 
 
 def chosen_tools(names: Iterable[str] | None = None) -> tuple[str, ...]:
     """Names of tools, all installed ones where None; UnknownNameError or MissingPackageError for one that is not."""
     known = _rows()
-    rows = {name: known[name.replace("wholebody", "qp").removesuffix(f"/{RETARGET}")] for name in stepping()}
+    rows = {name: known[name.replace("wholebody", "qp").removesuffix(f"/{RETARGET}")] for name in STEPPING}
     if names is None:
         return tuple(name for name, row in rows.items() if row.installed())
     chosen = tuple(names)
@@ -173,9 +163,8 @@ def chosen_tools(names: Iterable[str] | None = None) -> tuple[str, ...]:
 def make_tool(name: str, track: Track) -> Tool:
     """Set a tool up for a reach; errors as in `chosen_tools`."""
     (name,) = chosen_tools([name])
-    family, _, solver = name.partition("/")
-    ours = family == "wholebody"
-    tool: Tool = _class_of("own", "Tool")(track, solver) if ours else _class_of(name, "Tool")(track)
+    ours = name.startswith("wholebody")
+    tool: Tool = _class_of("own", "Tool")(track, name) if ours else _class_of(name, "Tool")(track)
     return tool
 
 

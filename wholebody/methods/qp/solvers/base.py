@@ -52,10 +52,6 @@ class QPSolver(ABC):
         programs, self._programs = self._programs, {}
         return programs
 
-    def load(self) -> None:
-        """Import what `solve_cold` needs, for those who cannot wait for it later."""
-        return
-
     @abstractmethod
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise by the solver, from the solver's own last answer where it takes one."""
@@ -116,9 +112,6 @@ class Scaling(NamedTuple):
 
     x: float = 100.0  # what it is multiplied by, so that its entries are as large as the residuals
     heaviest: float = 1e5  # scale of a row at most, squared; larger = heavy rows closer, light ones later
-    # least value of slots without a row: never active, and no other kind of row than those in use
-    inactive: float = -1e3
-    infinite: float = 1e30  # what a solver takes for infinite
 
 
 SCALING = Scaling()

@@ -11,10 +11,10 @@ import numpy as np
 from wholebody.base.arrays import Array, with_values
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
-from wholebody.methods.qp.active_set import compiled_kernel, last_resort, solve_from
+from wholebody.methods.qp.active_set import compiled_kernel, last_resort, solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import CORRECTIONS
-from wholebody.methods.qp.solvers.base import SCALING, QPSolver, read_active, scaled_split
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, SCALING, QPSolver, read_active, scaled_split
 
 PACKAGES: Mapping[str, str] = MappingProxyType(
     {"daqp": "daqp", "quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
@@ -23,6 +23,7 @@ PACKAGES: Mapping[str, str] = MappingProxyType(
 
 
 FAR = 1e20  # what all solvers take for infinite
+PATIENCE = 120  # corrections of a set that nothing is known of, before OSQP is asked
 
 
 def solver_names() -> tuple[str, ...]:
@@ -33,18 +34,14 @@ def solver_names() -> tuple[str, ...]:
 
 
 def make_solver(name: str, hot_start: bool = True) -> QPSolver:
-    """A QP solver by name, for the programs of one run; all but the first two are those of qpsolvers."""
+    """A QP solver by name, for the programs of one run; all but "active_set" are those of qpsolvers."""
     compiled_kernel()  # not in the middle of a solve
     if not isinstance(name, str):
         raise InputError(f"solver is {shown(name)}; give the name of a QP solver, such as 'osqp'")
-    if name == "osqp":
-        from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
-
-        return OSQPSolver(hot_start)
     if name == "active_set":
-        from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
-
         return ActiveSetSolver(hot_start)
+    if name == "osqp":  # qpsolvers takes half a second to import, and OSQP is hardly ever asked
+        return QpsolversSolver(name, hot_start)
     if name not in solver_names() and name in PACKAGES:
         package = PACKAGES[name]
         raise MissingPackageError(f"the QP solver {name} is not installed; install it with: pip install {package}")
@@ -62,10 +59,7 @@ class QpsolversSolver(QPSolver):
     def __init__(self, name: str, hot_start: bool = True) -> None:
         """Take a name that `qpsolvers.available_solvers` lists."""
         super().__init__(hot_start)
-        from qpsolvers import dense_solvers
-
         self.name = name
-        self._sparse = name not in dense_solvers
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
@@ -79,7 +73,7 @@ class QpsolversSolver(QPSolver):
 
     def _asked(self, program: QuadraticProgram) -> tuple[Array, Array, Array]:
         """What the solver answers: x (n,), and multipliers and room of the inequalities (k + 2 n,); else zeros."""
-        from qpsolvers import Problem, solve_problem
+        from qpsolvers import Problem, dense_solvers, solve_problem
         from scipy import sparse
 
         n, m = program.size, len(program.target)
@@ -87,7 +81,7 @@ class QpsolversSolver(QPSolver):
         above = np.concatenate([-form.matrix[m:], box, -box])
         most = np.concatenate([-form.least[m:], form.box[1], -form.box[0]]).clip(-FAR, FAR)
         parts = np.diag(form.diagonal), above, form.matrix[:m]
-        hessian, rows, equal = map(sparse.csc_matrix, parts) if self._sparse else parts
+        hessian, rows, equal = parts if self.name in dense_solvers else map(sparse.csc_matrix, parts)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
@@ -101,3 +95,16 @@ class QpsolversSolver(QPSolver):
             return np.zeros(n), np.zeros(len(most)), np.zeros(len(most))
         multiplier = np.zeros(len(most)) if found.z is None else np.asarray(found.z)
         return found.x[:n] / SCALING.x, multiplier, most - above @ found.x
+
+
+class ActiveSetSolver(QPSolver):
+    """The primal-dual active set method throughout; OSQP where the sets do not settle."""
+
+    name = "active_set"
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
+        solution = solve_from(program, violated_set(program), PATIENCE)
+        if solution is None:
+            return QpsolversSolver("osqp").solve_cold(program)
+        return with_values(solution, by=ACTIVE_SET)
