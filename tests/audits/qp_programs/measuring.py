@@ -60,7 +60,6 @@ def measure(
         shift = turn % len(solvers)
         for name in [*solvers[shift:], *solvers[:shift]]:
             solver = make_solver(name, hot_start=False)
-            solver.load()
             solver.solve(mine[-1].program)
             rows += [_row(one, name, solver) for one in mine]
         if mine[0].set != done:

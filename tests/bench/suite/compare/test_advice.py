@@ -114,7 +114,7 @@ def test_advice_names_no_winner_among_solvers_of_one_method() -> None:
     assert set(choice.fastest) == {"qp/osqp", "qp/daqp"}
     assert set(choice.exact) == {"qp/osqp", "qp/daqp", "slow"}
     said = advice(made, rows)
-    assert "`qp`" in said[0]
+    assert "`qp/daqp`" in said[0]
     assert "84 %" in said[0]  # Wilson, 20 of 20
     times = {standing.method: standing.slowness for standing in standings(made, rows)}
     assert times["qp/daqp"].low < 1.0 < times["qp/daqp"].high

@@ -124,7 +124,7 @@ def reach_problem(track: Track, goal: Goal) -> wb.Problem:
 class OwnTool(Tool):
     """One program a step, with the workspace of the step before."""
 
-    def __init__(self, track: Track, name: str) -> None:
+    def __init__(self, track: Track, name: str = "wholebody") -> None:
         """State the problem; a name that ends in `RETARGET` is for a goal that is replaced."""
         self.name, self._tip = name, track.tip
         self._moved = None if name.endswith(RETARGET) else MovingPoint(track.tip, np.array(track.targets[0]))

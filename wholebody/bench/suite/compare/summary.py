@@ -174,7 +174,7 @@ def material(
     return Material(settings, chunks, results, summaries(results, chunks, settings.cap), facts, missing)
 
 
-OURS = "qp"  # our default method; "qp/..." is the same method with other settings for its programs
+OURS = "qp"  # our default method
 
 Figures = Mapping[tuple[str, int], float]  # one positive figure a problem, by the name of its set and its number
 
@@ -225,13 +225,8 @@ def errors_of(results: Results, family: str, adapter: str) -> Figures:
 
 
 def named(adapters: Sequence[str]) -> str:
-    """Return methods in words; several settings of our default method are listed behind its name."""
-    ours = [name for name in adapters if f"{name}/".startswith(f"{OURS}/")]
-    if len(ours) < 2:
-        return ", ".join(f"`{name}`" for name in adapters)
-    listed = f"`{OURS}` (any of {', '.join(f'`{name}`' for name in ours)})"
-    names = dict.fromkeys(listed if name in ours else f"`{name}`" for name in adapters)
-    return ", ".join(names)
+    """Return methods in words."""
+    return ", ".join(f"`{name}`" for name in adapters)
 
 
 class Choice(NamedTuple):

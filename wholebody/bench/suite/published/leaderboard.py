@@ -10,7 +10,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import is_folder
 from wholebody.bench.suite.compare.report import groups, overview, write_summary
 from wholebody.bench.suite.compare.results import ANSWERED, FAILED, REFUSED, Record, Results
-from wholebody.bench.suite.compare.summary import advice, choices, named, reference, standings, summaries
+from wholebody.bench.suite.compare.summary import advice, reference, standings, summaries
 from wholebody.bench.suite.published import judging
 from wholebody.bench.suite.published.answers import read_answers
 from wholebody.bench.suite.published.judging import Judged, Verdict, cells, judge, left_out
@@ -66,8 +66,8 @@ def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[str]
         charts[name], _ = overview(rows, titles, methods, out / "charts" / name)
     said = advice(found, rows)
     text = render(
-        "leaderboard.md", verdicts=verdicts, index=index, sets=found.sets, advice=said, picked=choices(found, rows),
-        ranked=standings(found, rows), reference=reference(found), named=named, cells=cells, left_out=left_out,
+        "leaderboard.md", verdicts=verdicts, index=index, sets=found.sets, advice=said,
+        ranked=standings(found, rows), reference=reference(found), cells=cells, left_out=left_out,
         charts=list(charts), units={verdict.answers.method: _in_kernels(verdict) for verdict in verdicts},
     )  # fmt: skip
     write_text(out / "leaderboard.md", text + "\n")
