@@ -203,7 +203,7 @@ def test_what_belongs_to_a_run_is_neither_pickled_nor_copied(way: Callable[[Any]
     if method is None:
         scene.add(wb.Sphere(0.02), name="ball", at=(0.5, 0.0, 0.1), body=wb.Body(mass=1.0))
         world = wb.World(scene, dt=0.01)
-        held = [world, world.engine, FrameLoop(scene, scene.figure.neutral), LiveWorld(scene)]
+        held: list[Any] = [world, world.engine, FrameLoop(scene, scene.figure.neutral), LiveWorld(scene)]
     else:
         held = [method.tracker(problem, 0.01), wb.tracking.Drag(problem), LiveDrag(problem)]
     for thing in held:
