@@ -67,7 +67,7 @@ def default_measures(
     """Resolved `Effort`, a person's `Rhythm`, `Stance` of sliding feet; kneelers count them from a kneeling posture.
 
     `hanging` are arms that hang, see `free_arms`, `heads` persons of whom a term places eyes or head, `seats` what
-    persons sit on, see `seated`. Shares of knees and lumbar spine are of somebody who bends down on both feet: on a seat
+    persons sit on, see `seated`. Shares of knees and lumbar spine are of somebody who bends on both feet: on a seat
     the knees follow the pedals, and who leans back bends no lordosis. So is the fourfold weight of lumbar flexion: of
     who looks at something, a back that is seated bends before the trunk leans to a side. Without a term of the head it
     stays: one of 40 typists is not found without it. How far the seat is from the start is no effort either.
