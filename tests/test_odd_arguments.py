@@ -383,6 +383,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     sit = {"on": "crate", "pelvis": "pelvis", "trunk": "thorax", "weight": 1.0}
     yield "Sit", Call(wb.Sit, sit, on_a_person)
     yield "Sit(back)", Call(lambda back: wb.Sit("crate", back), {"back": "post"}, on_a_person)
+    yield "LevelHead", Call(wb.tasks.LevelHead, {"frame": "gaze", "weight": 1.0}, on_a_person)
     yield "Hang", Call(wb.tasks.Hang, {"arms": ["left_upper_arm"], "weight": 1.0}, on_a_person)
     yield "Stance", Call(wb.tasks.Stance, {"feet": ["left_foot", "right_foot"], "weight": 1.0}, on_a_person)
     middle = {"on": "crate", "pelvis": "pelvis", "weight": 1.0}

@@ -114,7 +114,7 @@ class Problem(checks.FixedAttributes):
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
             measures: costs to minimise; None for `Effort()`, of a person also `Rhythm()`, `Stance()`, `Hang()`,
-                and of who sits `SeatCenterline()`.
+                `LevelHead()`, and of who sits `SeatCenterline()`.
             clearance: least distance between pieces, metres.
             touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
             range_of_motion: whether a person keeps its ranges of motion and reach cones, and moves in its `Rhythm`.

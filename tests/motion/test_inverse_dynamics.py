@@ -112,7 +112,7 @@ def test_parts_of_loads_add_up_where_a_hand_bears_too() -> None:
         q, np.array([still, dynamics.free_torque(q, v, a) - still]), np.ones(2), stand
     )  # fmt: skip
     assert np.linalg.norm(whole.ground.forces[stand.owner == 2]) > 1.0
-    np.testing.assert_allclose(parts.sum(axis=0)[6:], whole.torque[6:], atol=1e-6)
+    np.testing.assert_allclose(parts.sum(axis=0)[6:], whole.strained[6:], atol=1e-6)
     np.testing.assert_allclose(wrenches.sum(axis=0), whole.wrench, atol=1e-6)
 
 
@@ -141,7 +141,7 @@ def test_derivatives_are_those_of_finite_differences(feet: tuple[bool, bool], to
             if any((one.ground.split.any(axis=1) != bears).any() for one in ends):
                 continue
             checked += 1
-            slope = (ends[0].torque - ends[1].torque)[6:] / (2 * step)
+            slope = (ends[0].strained - ends[1].strained)[6:] / (2 * step)
             np.testing.assert_allclose(found.torque[number][6:, dof], slope, atol=1e-2 * max(1.0, np.abs(slope).max()))
             if any(feet):
                 places = [zero_moment_point(one.wrench, stand.height) for one in ends]

@@ -97,6 +97,7 @@ def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None
             wb.tasks.RotationEffort(3.0),
             wb.tasks.Stance(weight=4.0),
             wb.tasks.Hang(["left_upper_arm"]),
+            wb.tasks.LevelHead(weight=2.0),
             wb.tasks.SeatCenterline("ground", weight=3.0),
             wb.ergonomics.Exertion(strength=wb.motion.Strength(sex="female"), weight=5.0),
         ],

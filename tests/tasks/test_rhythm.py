@@ -13,7 +13,7 @@ import wholebody as wb
 from tests.audits import human_postures
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
-from wholebody.tasks import Hang
+from wholebody.tasks import Hang, LevelHead
 from wholebody.tasks.base import filled
 
 
@@ -317,3 +317,17 @@ def test_hang_is_the_angle_from_where_arms_hang(scene: wb.Scene) -> None:
     cosine = float((here @ upright.T @ np.array((0.0, 0.0, 1.0)))[2])
     assert term.value(scene.state(q)) == pytest.approx(np.arccos(cosine) ** 2, rel=1e-9)
     assert wb.check_derivatives(Hang(), scene, q).agrees
+
+
+def test_a_head_is_level_while_it_nods_and_turns(scene: wb.Scene) -> None:
+    figure = scene.figure
+    standing = figure.posture("standing")
+    term = LevelHead().resolve(scene, standing)
+    nods = figure.with_joints(standing, {"neck1_rotation": 0.5, "spine2_flexion": 0.0})
+    assert term.value(scene.state(nods)) == pytest.approx(0.0, abs=1e-12)
+    tilted = figure.with_joints(standing, {"neck1_lateral": 0.4})
+    assert term.value(scene.state(tilted)) == pytest.approx(np.sin(0.4) ** 2, rel=1e-9)
+    step = 1e-6 * np.eye(figure.model.nv)
+    ahead, back = ([term.value(scene.state(pin.integrate(figure.model, tilted, sign * way))) for way in step]
+                   for sign in (1.0, -1.0))  # fmt: skip
+    np.testing.assert_allclose(term.gradient(scene.state(tilted)), np.subtract(ahead, back) / 2e-6, atol=1e-6)

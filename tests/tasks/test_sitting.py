@@ -30,6 +30,23 @@ def heading(person: wb.Figure, q: np.ndarray) -> float:
     return float(np.degrees(np.arctan2(ahead[1], ahead[0])))
 
 
+@pytest.mark.parametrize(("stature", "mass"), [(1.93, 120.0), (1.88, 95.0)])
+def test_who_is_too_tall_for_a_roof_slumps_with_a_level_head(stature: float, mass: float) -> None:
+    """Their heads were tilted by 48 and 36 degrees, with a straight back."""
+    man = wb.load("human", stature=stature, mass=mass)
+    scene = room(man).add(wb.Box((0.42, 0.48, 0.06)), name="seat", at=(0.21, 0.0, 0.37))
+    scene.add(wb.Box((0.04, 0.44, 0.5)), name="back", at=(-0.02, 0.0, 0.82))
+    scene.add(wb.Box((1.0, 1.1, 0.04)), name="roof", at=(0.3, 0.0, 1.32))
+    looks = [wb.Sit("seat", back="back"), wb.Stand("floor", balance=False), wb.ergonomics.Look((4.0, 0.0, 1.0))]
+    solution = wb.solve(wb.Problem(scene, "sitting", constraints=looks))
+    assert solution.solved
+    tilt = np.degrees(np.arcsin(man.placement(solution.q, "gaze").rotation[2, 1]))
+    assert abs(tilt) < 10.0
+    assert sum(angle for name, angle in man.joint_values(solution.q).items() if "lateral" in name) == pytest.approx(
+        0.0, abs=0.2
+    )
+
+
 @pytest.mark.parametrize("mass", [61.5, 101.6])
 def test_who_begins_upright_sits_down_straight_ahead(mass: float) -> None:
     """From standing legs, people sat on a corner of the stool, with the legs far ahead."""

@@ -17,7 +17,7 @@ from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.motion.strength import Strength
+from wholebody.motion.strength import Shoulder, Strength, shoulders
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.base import ComputedTogether, Term, filled
@@ -41,16 +41,11 @@ StrengthOf = Annotated[Strength, _strength]
 _T = TypeVar("_T", bound="_HeldPerson")
 
 
-class Shoulder(NamedTuple):
-    """A shoulder, whose flexion strength is that of the torque about the axis across upper arm and axis of abduction.
-
-    The joint's own axis of flexion is along an arm held out sideways: torques about the axes of the three joints then
-    lack a part of what the muscles exert. With this axis the three are square in every posture.
-    """
+class HeldArm(NamedTuple):
+    """A shoulder, and what it holds."""
 
     place: int  # of the flexion among the joints with published strength
-    abduction: int  # the joint with whose segment the axis goes
-    axis: Array  # (3,) in the axes of that joint; of a hanging arm that of flexion
+    shoulder: Shoulder
     arm: range  # joints of the arm
 
 
@@ -70,7 +65,7 @@ class Statics(NamedTuple):
     upper: Array  # (k,) greatest torque towards positive angles [N m]; infinite where none is published
     lower: Array  # (k,) least, negative
     back: tuple[int, int]  # joints of L5/S1, and of the next disc that has one
-    shoulders: tuple[Shoulder, ...]
+    arms: tuple[HeldArm, ...]
 
     def torques(self, state: State, joints: Indices, carriers: Indices) -> tuple[Array, Array]:
         """Torques (k,) of some joints [N m], and their derivative (k, nv)."""
@@ -130,23 +125,24 @@ class Statics(NamedTuple):
     def efforts(self, state: State) -> tuple[Array, Array]:
         """Torques (k,) as shares of the strength in their directions, with sign, and the derivative (k, nv)."""
         torque, moves = self.torques(state, self.joints, self.carriers)
-        for one in self.shoulders:
+        for one in self.arms:
             torque[one.place], moves[one.place] = self._across(state, one)
         limit = np.where(torque >= 0.0, self.upper, -self.lower)
         return torque / limit, moves / limit[:, None]
 
-    def _across(self, state: State, one: Shoulder) -> tuple[float, Array]:
+    def _across(self, state: State, one: HeldArm) -> tuple[float, Array]:
         """Torque of a shoulder about the axis across the upper arm [N m], and its derivative (nv,)."""
-        axis, at = state.data.oMi[one.abduction].rotation @ one.axis, state.data.oMi[one.abduction].translation
+        carrier, placed = one.shoulder.abduction, state.data.oMi[one.shoulder.abduction]
+        axis, at = placed.rotation @ one.shoulder.axis, placed.translation
         weight = np.array((0.0, 0.0, -GRAVITY * sum(state.model.inertias[k].mass for k in one.arm)))
         acting = [(state.center_of_mass(one.arm), state.center_of_mass_jacobian(one.arm), weight)]
         loads = zip(*self.loads.at(state), self.loads.vectors, self.loads.places, strict=True)
         acting += [(point, moves, force) for point, moves, force, load in loads if load.joint in one.arm]
-        d_at = point_rows(state, at, one.abduction)
+        d_at = point_rows(state, at, carrier)
         moment = sum((cross(point - at, force) for point, _, force in acting), np.zeros(3))
         derivative = -sum(cross(force, axis) @ (moves - d_at) for _, moves, force in acting)
         about = np.r_[0, 0, 0, cross(axis, moment)][None]
-        turned = state.rows(about, *np.array([[one.abduction], [0]], dtype=np.intp))[0]
+        turned = state.rows(about, *np.array([[carrier], [0]], dtype=np.intp))[0]
         return -float(moment @ axis), derivative - turned
 
     def compression(self, state: State) -> tuple[float, Array]:
@@ -197,20 +193,17 @@ def statics_of(scene: Scene, term: _HeldPerson) -> Statics:
     joints = there[known]
     if standing:
         pressure(state, loads, body, 0.0)  # forces that lift are refused here
-    shoulders = []
-    for pair in ([f"{side}_shoulder_{way}" for way in ("flexion", "abduction")] for side in SIDES):
-        if {*pair} <= {*figure.joints}:
-            first, second = (joined.joint_id(prefix + name) for name in pair)
-            last = max(k for k in range(second, scene.model.njoints) if second in scene.model.supports[k])
-            axis = scene.model.jointPlacements[second].rotation.T @ scene.model.joints[first].createData().S[3:].ravel()
-            place = int(np.flatnonzero(joints == scene.model.joints[first].idx_v)[0])
-            shoulders.append(Shoulder(place, second, axis, range(second, last + 1)))
+    arms = []
+    for one in shoulders(joined, prefix):
+        last = max(k for k in range(one.flexion, scene.model.njoints) if one.flexion in scene.model.supports[k])
+        place = int(np.flatnonzero(joints == scene.model.joints[one.flexion].idx_v)[0])
+        arms.append(HeldArm(place, one, range(one.abduction, last + 1)))
     return Statics(
         loads, body,
         tuple(inputs.find_place(scene, prefix + foot, where) for foot in FEET) if standing else (),
         joints, state.column_joint[joints], upper[known], lower[known],
         (joined.joint_id(f"{prefix}spine1_flexion"), joined.joint_id(f"{prefix}spine2_flexion")),
-        tuple(shoulders),
+        tuple(arms),
     )  # fmt: skip
 
 

@@ -41,6 +41,8 @@ class Torques:
         dt: seconds from frame to frame.
         torque: (n, nv) torque of each joint, N m (force of sliding joints, N), after the ground's forces; positive
             towards positive angles. The six columns of a free root hold what is missing (see there).
+        strained: (n, nv) the same about the axes to which strength applies: those of the joints, but of a shoulder's
+            flexion the one across the upper arm (`wholebody.motion.strength.Shoulder`), as in `wb.ergonomics`.
         feet: names of the feet, and after them of other segments that touch things.
         force: (n, feet, 3) force of the ground or of things on each of these, N, in the world. It acts on the segment;
             the joint of the toes bears nothing.
@@ -65,6 +67,7 @@ class Torques:
     figure: Figure
     dt: float
     torque: Array = field(repr=False)
+    strained: Array = field(repr=False)
     feet: tuple[str, ...]
     force: Array = field(repr=False)
     moment: Array = field(repr=False)
@@ -88,9 +91,9 @@ class Torques:
 
     @property
     def share(self) -> Array:
-        """(n, nv) torque as a share of the strength in its direction; more than 1 is more than the person can."""
-        limit = np.where(self.torque >= 0.0, self.upper, -self.lower)
-        return np.asarray(np.abs(self.torque) / limit)
+        """(n, nv) `strained` as a share of the strength in its direction; more than 1 is more than the person can."""
+        limit = np.where(self.strained >= 0.0, self.upper, -self.lower)
+        return np.asarray(np.abs(self.strained) / limit)
 
     @property
     def largest_share(self) -> float:
@@ -124,9 +127,9 @@ class Torques:
         first = "no joint has a known strength"
         if np.isfinite(self.lower).any():
             first = (
-                f"{self.joint_of(column)} needs {abs(self.torque[frame, column]):.0f} N m, {share[frame, column]:.0%} "
-                f"of its strength, at {frame * self.dt:.2f} s; {int(self.beyond.sum())} of {len(self.torque)} frames "
-                "need more than the strength of a joint"
+                f"{self.joint_of(column)} needs {abs(self.strained[frame, column]):.0f} N m, "
+                f"{share[frame, column]:.0%} of its strength, at {frame * self.dt:.2f} s; "
+                f"{int(self.beyond.sum())} of {len(self.torque)} frames need more than the strength of a joint"
             )
         force, moment = (np.linalg.norm(part, axis=1) for part in (self.missing[:, :3], self.missing[:, 3:]))
         return (
@@ -196,7 +199,7 @@ def torques(
     v, a = calm.velocities(), calm.accelerations()
     dynamics, names, places = bearing(clip, calm.q, stands, scene, friction)
     count, nv = len(clip), figure.model.nv
-    torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
+    torque, strained, missing = np.zeros((count, nv)), np.zeros((count, nv)), np.zeros((count, ROOT))
     force, moment, pressure = (np.zeros((count, len(names), 3)) for _ in range(3))
     both, outside = np.zeros((count, 3)), np.zeros(count)
     marks: Mask = np.zeros((count, len(names)), dtype=bool)
@@ -204,7 +207,7 @@ def torques(
     for k, stand in enumerate(places):
         marks[k, stand.owner] = True
         loads = dynamics.loads(calm.q[k], v[k], a[k], stand)
-        torque[k] = loads.torque
+        torque[k], strained[k] = loads.torque, loads.strained
         if not dynamics.free:
             continue
         forces = loads.ground.forces
@@ -219,7 +222,8 @@ def torques(
         both[k] = _pressure(pressed[standing], stand.points[standing])
         outside[k] = dynamics.outside(loads, stand)
     lower, upper = torque_limits(figure, strength)
-    return Torques(figure, clip.dt, torque, names, force, moment, pressure, both, marks, missing, outside, lower, upper)
+    forces = names, force, moment, pressure, both, marks
+    return Torques(figure, clip.dt, torque, strained, *forces, missing, outside, lower, upper)
 
 
 def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:

@@ -18,6 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
 from wholebody.motion.stance import pieces_on
+from wholebody.motion.strength import shoulders, with_strength_axes
 from wholebody.tasks.balance import DOWN, convex_polygon
 from wholebody.tasks.surfaces import outermost
 
@@ -109,13 +110,14 @@ class Loads(NamedTuple):
     """Loads of one frame."""
 
     torque: Array  # (nv,) of the joints, N m, after the ground's forces; the root's part is what is missing
+    strained: Array  # (nv,) the same about the axes of strength, see `wholebody.motion.strength.Shoulder`
     wrench: Array  # (6,) that the feet's ground has to give: force N, and moment about the world's origin N m
     ground: GroundForces  # what it gives; about the centre of mass
     center: Array  # (3,) centre of mass, metres
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of torques (nv, nv) and of the zero moment point (2, nv) with respect to q, v and a."""
+    """Derivatives of `Loads.strained` (nv, nv) and of the zero moment point (2, nv) with respect to q, v and a."""
 
     torque: tuple[Array, Array, Array]
     place: tuple[Array, Array, Array]
@@ -126,7 +128,20 @@ class InverseDynamics:
 
     def __init__(self, figure: Figure, feet: Sequence[str], friction: float, touching: Sequence[int] = ()) -> None:
         one_figure(figure, "dynamics: the figure")
-        self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
+        self._figure, self._still, self._friction = figure.model, figure.model.createData(), friction
+        self._model = model = with_strength_axes(figure)
+        self._data = model.createData()
+        ids = [model.getJointId(name) for name in figure.model.names]
+        self._places, self._columns = (
+            np.concatenate([np.arange(begin, begin + size, dtype=np.intp) for begin, size in spans])
+            for spans in zip(
+                *(((one.idx_q, one.nq), (one.idx_v, one.nv)) for one in map(model.joints.__getitem__, ids[1:])),
+                strict=True,
+            )
+        )
+        self._strained = self._columns.copy()
+        for one in shoulders(figure):
+            self._strained[figure.model.joints[one.flexion].idx_v] = model.joints[ids[one.abduction] + 1].idx_v
         self.feet = tuple(feet)  # names of the segments or frames that may stand; none for a root that is fixed
         joints = [int(figure.model.frames[figure.frame_id(foot)].parentJoint) for foot in self.feet]
         self._soles = [pieces_on(figure, joint) for joint in joints]
@@ -134,17 +149,18 @@ class InverseDynamics:
             if joint == 0 or not pieces:
                 raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
         self.joints = [*joints, *touching]  # of the feet, and after them those that touch
+        self._bearing = [ids[joint] for joint in self.joints]
         self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))  # N
         self.free = figure.root == "free"
 
     def stand(self, q: Array, feet: Sequence[bool], touches: Touches | None = None) -> Stand:
         """Where a posture (nq,) stands, on some of the feet, and touches things."""
-        pin.forwardKinematics(self._model, self._data, q)
+        pin.forwardKinematics(self._figure, self._still, q)
         points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=int)]
         for foot in np.flatnonzero(feet).tolist():
             lows = np.vstack(
                 [
-                    outermost(piece.geometry, self._data.oMi[piece.parentJoint] * piece.placement, DOWN)
+                    outermost(piece.geometry, self._still.oMi[piece.parentJoint] * piece.placement, DOWN)
                     for piece in self._soles[foot]
                 ]
             )
@@ -160,41 +176,60 @@ class InverseDynamics:
     def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:
         """Loads of a posture (nq,) with its velocity and acceleration (nv,)."""
         model, data = self._model, self._data
-        torque = np.array(pin.rnea(model, data, q, v, a))
+        q, torque = self._posture(q), self.free_torque(q, v, a)
         center = np.array(pin.centerOfMass(model, data, q))
         if not self.free:
-            return Loads(torque, np.zeros(6), ground_forces(np.zeros(6), center, np.zeros((0, 3)), 1.0), center)
+            return Loads(
+                torque[self._columns],
+                torque[self._strained],
+                np.zeros(6),
+                ground_forces(np.zeros(6), center, np.zeros((0, 3)), 1.0),
+                center,
+            )
         pin.computeJointJacobians(model, data, q)
         wrench = np.array(data.oMi[1].act(pin.Force(torque[:ROOT])).vector)
         ground = self.split(wrench, center, stand)
         for part, total in enumerate(foot_wrenches(ground.forces, stand, len(self.joints))):
-            torque -= pin.getJointJacobian(model, data, self.joints[part], pin.ReferenceFrame.WORLD).T @ total
+            torque -= pin.getJointJacobian(model, data, self._bearing[part], pin.ReferenceFrame.WORLD).T @ total
             wrench -= total if part >= len(self.feet) else 0.0  # what things give
-        return Loads(torque, wrench, ground, center)
+        return Loads(torque[self._columns], torque[self._strained], wrench, ground, center)
 
     def free_torque(self, q: Array, v: Array, a: Array) -> Array:
-        """(nv,) torques in the air."""
-        return np.array(pin.rnea(self._model, self._data, q, v, a))
+        """Torques in the air, of joints and about axes of strength, for `grounded`."""
+        return np.array(pin.rnea(self._model, self._data, self._posture(q), self._tangent(v), self._tangent(a)))
+
+    def _posture(self, q: Array) -> Array:
+        """The posture (nq,) of the figure in the model with axes of strength."""
+        whole: Array = np.zeros(self._model.nq)
+        whole[self._places] = q
+        return whole
+
+    def _tangent(self, v: Array) -> Array:
+        """The same of a velocity or an acceleration (nv,)."""
+        whole: Array = np.zeros(self._model.nv)
+        whole[self._columns] = v
+        return whole
 
     def grounded(self, q: Array, torques: Array, shares: Array, stand: Stand) -> tuple[Array, Array]:
-        """Parts of torques (k, nv) in the air, after all forces, and of the wrench (k, 6) that feet have to give."""
+        """Parts of `strained` (k, nv), and of the wrench (k, 6) that feet have to give, of parts of `free_torque`."""
         # The forces are linear while the same edges of friction bear: those at the sum with shares (k,).
         model, data = self._model, self._data
         if not self.free:
-            return torques, np.zeros((len(torques), 6))
+            return torques[:, self._strained], np.zeros((len(torques), 6))
+        q = self._posture(q)
         center = np.array(pin.centerOfMass(model, data, q))
         pin.computeJointJacobians(model, data, q)
         wrenches = np.array([data.oMi[1].act(pin.Force(part[:ROOT])).vector for part in torques])
         split = self.split(shares @ wrenches, center, stand).split
         left, feet = torques.copy(), wrenches.copy()
-        for foot, joint in enumerate(self.joints):
+        for foot, joint in enumerate(self._bearing):
             mine = stand.owner == foot
             if mine.any():
                 jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD)
                 given = wrenches @ (point_map(stand.points[mine]) @ split[np.repeat(mine, 3)] @ moving(center)).T
                 left -= given @ jacobian
                 feet -= given if foot >= len(self.feet) else 0.0
-        return left, feet
+        return left[:, self._strained], feet
 
     def split(self, wrench: Array, center: Array, stand: Stand) -> GroundForces:
         """The ground's forces for a wrench (6,) about the world's origin."""
@@ -215,13 +250,14 @@ class InverseDynamics:
 
     def derivatives(self, q: Array, v: Array, a: Array, stand: Stand) -> Derivatives:
         """Derivatives of `loads` and of the zero moment point."""
-        model, data, nv = self._model, self._data, self._model.nv
+        model, data = self._model, self._data
         here = self.loads(q, v, a, stand)
+        q, v, a = self._posture(q), self._tangent(v), self._tangent(a)
         parts = [np.array(part) for part in pin.computeRNEADerivatives(model, data, q, v, a)]
         parts[2] = np.triu(parts[2]) + np.triu(parts[2], 1).T
-        none = np.zeros((2, nv))
         if not self.free:
-            return Derivatives((parts[0], parts[1], parts[2]), (none, none, none))
+            none = np.zeros((2, len(self._columns)))
+            return self._about_strength(parts, [none, none, none])
         J = np.array(pin.computeJointJacobians(model, data, q))
         action = np.asarray(data.oMi[1].toDualActionMatrix())
         wrenches = [action @ part[:ROOT] for part in parts]
@@ -231,7 +267,7 @@ class InverseDynamics:
             twist = pin.Motion(J[:, column])
             wrenches[0][:, column] += twist.cross(pin.Force(total)).vector
         shift, whole = moving(here.center), [wrench.copy() for wrench in wrenches]
-        for foot, joint in enumerate(self.joints):
+        for foot, joint in enumerate(self._bearing):
             mine = np.repeat(stand.owner == foot, 3)
             if not mine.any():
                 continue
@@ -241,7 +277,12 @@ class InverseDynamics:
                 part -= jacobian.T @ given @ wrench
                 feet -= given @ wrench if foot >= len(self.feet) else 0.0
             parts[0] -= self._turning(J, joint, bent[foot])
-        return Derivatives((parts[0], parts[1], parts[2]), _place_derivatives(here.wrench, wrenches, stand.height))
+        wrenches = [wrench[:, self._columns] for wrench in wrenches]
+        return self._about_strength(parts, _place_derivatives(here.wrench, wrenches, stand.height))
+
+    def _about_strength(self, parts: Sequence[Array], places: Sequence[Array]) -> Derivatives:
+        at, speed, push = (part[np.ix_(self._strained, self._columns)] for part in parts)
+        return Derivatives((at, speed, push), (places[0], places[1], places[2]))
 
     def _turning(self, J: Array, joint: int, wrench: Array) -> Array:
         """(nv, nv) derivative with respect to posture of a fixed wrench's moments about the axes of a chain."""

@@ -35,7 +35,7 @@ class LoadChange:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest torque (nv,) that a joint may need: its strength, or the most that it needed before."""
-        torque = self.before.torque
+        torque = self.before.strained
         return np.minimum(self.before.lower, torque.min(axis=0)), np.maximum(self.before.upper, torque.max(axis=0))
 
     @property
@@ -43,7 +43,7 @@ class LoadChange:
         """(nv,) share by which the largest torque of each joint is beyond its bound; 0 where it is not."""
         lower, upper = self.bounds
         with np.errstate(divide="ignore", invalid="ignore"):
-            over = np.maximum(self.after.torque.max(axis=0) / upper, self.after.torque.min(axis=0) / lower) - 1.0
+            over = np.maximum(self.after.strained.max(axis=0) / upper, self.after.strained.min(axis=0) / lower) - 1.0
         known = np.isfinite(self.before.lower) | np.isfinite(self.before.upper)
         return np.where(known, np.maximum(np.nan_to_num(over, posinf=0.0, neginf=0.0), 0.0), 0.0)
 
@@ -90,10 +90,10 @@ class LoadChange:
         return said
 
     def _torque_missed(self, joint: int) -> str:
-        old, (lower, upper), now = self.before, self.bounds, self.after.torque[:, joint]
+        old, (lower, upper), now = self.before, self.bounds, self.after.strained[:, joint]
         high = now.max() / upper[joint] >= now.min() / lower[joint]
         sign, bound, strength = (1.0, upper, old.upper) if high else (-1.0, -lower, -old.lower)
-        needed, before = sign * now, max(float((sign * old.torque[:, joint]).max()), 0.0)
+        needed, before = sign * now, max(float((sign * old.strained[:, joint]).max()), 0.0)
         kept = "beyond" if before > strength[joint] else "within"
         others = int((self.beyond > TORQUE).sum()) - 1
         return (

@@ -7,9 +7,10 @@ From 40 years on men lose 12 % of it in ten years (Hurley 1995, Journals of Gero
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
@@ -21,6 +22,47 @@ from wholebody.figures.tables import table
 PERCENTILES = (5.0, 50.0, 95.0)
 STRONGEST = 40.0  # years: until which strength is whole
 LOSS = {"male": 0.012, "female": 0.0076}  # a year, of the strength at that age
+
+
+class Shoulder(NamedTuple):
+    """A shoulder, whose flexion strength is that of the torque about the axis across upper arm and axis of abduction.
+
+    The joint's own axis of flexion is along an arm held out sideways: torques about the axes of the three joints then
+    lack a part of what the muscles exert. With this axis the three are square in every posture.
+    """
+
+    flexion: int  # joint
+    abduction: int  # joint with whose segment the axis goes
+    axis: Array  # (3,) in the axes of that joint; of a hanging arm that of flexion
+
+
+def shoulders(figure: Figure, prefix: str = "") -> list[Shoulder]:
+    """Those of a person, or of the one of several figures whose names begin with a prefix."""
+    found = []
+    for side in ("left", "right"):
+        first, second = (f"{prefix}{side}_shoulder_{way}" for way in ("flexion", "abduction"))
+        if {first, second} <= {*figure.joints}:
+            joints = figure.joint_id(first), figure.joint_id(second)
+            own = figure.model.joints[joints[0]].createData().S[3:].ravel()
+            found.append(Shoulder(*joints, figure.model.jointPlacements[joints[1]].rotation.T @ own))
+    return found
+
+
+def with_strength_axes(figure: Figure) -> pin.Model:
+    """The model of a figure with a joint more in each shoulder, at zero, whose axis is that of its `Shoulder`."""
+    own, extra = figure.model, {one.abduction: one.axis for one in shoulders(figure)}
+    if not extra:
+        return own
+    made, place = pin.Model(), {0: 0}
+    made.gravity = own.gravity
+    for joint in range(1, own.njoints):
+        parent, motion = place[own.parents[joint]], own.joints[joint]
+        place[joint] = made.addJoint(parent, motion, own.jointPlacements[joint], own.names[joint])
+        if joint in extra:
+            axis = pin.JointModelRevoluteUnaligned(extra[joint])
+            place[joint] = made.addJoint(place[joint], axis, pin.SE3.Identity(), f"{own.names[joint]}: strength")
+        made.appendBodyToJoint(place[joint], own.inertias[joint], pin.SE3.Identity())
+    return made
 
 
 def _sex(value: Any, _: str) -> str:

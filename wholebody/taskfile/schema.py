@@ -179,7 +179,15 @@ CONSTRAINTS = {
 }
 
 MEASURES = {
-    **_forms(tasks.Effort, tasks.RotationEffort, tasks.Discomfort, tasks.Displacement, tasks.Rhythm, tasks.Hang),
+    **_forms(
+        tasks.Effort,
+        tasks.RotationEffort,
+        tasks.Discomfort,
+        tasks.Displacement,
+        tasks.Rhythm,
+        tasks.Hang,
+        tasks.LevelHead,
+    ),
     **_forms(tasks.Stance, tasks.SeatCenterline, tasks.PotentialEnergy),
     **_forms(ergonomics.Exertion, forces=FORCES, strength=STRENGTH),
 }

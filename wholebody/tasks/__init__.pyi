@@ -23,5 +23,5 @@ from wholebody.tasks.posture import Posture as Posture
 from wholebody.tasks.range_of_motion import RangeOfMotion as RangeOfMotion, ReachCones as ReachCones
 from wholebody.tasks.rhythm import Rhythm as Rhythm
 from wholebody.tasks.sit import SeatCenterline as SeatCenterline, Sit as Sit
-from wholebody.tasks.stand import Hang as Hang, Stance as Stance, Stand as Stand
+from wholebody.tasks.stand import Hang as Hang, LevelHead as LevelHead, Stance as Stance, Stand as Stand
 from wholebody.tasks.touch import Lean as Lean, Touch as Touch

@@ -64,9 +64,41 @@ def standing_corners(scene: Scene, q: Array, feet: Sequence[str]) -> tuple[Array
         points[:, 2] -= soles.radii
         for number, shape, local in soles.ellipsoids:
             points[number] = outermost(shape, state.data.oMi[int(soles.joints[number])] * local, DOWN)[0]
+        heights = [float(state.data.oMi[k].translation[2]) for k in _carried(scene, feet)]
     height = points[:, 2]
-    low = height <= np.minimum.reduceat(height, soles.begin)[soles.foot] + STANDING_HEIGHT
+    least = np.minimum.reduceat(height, soles.begin)
+    # A hand may bear where it touches a thing; feet may be raised.
+    raised = least > min(heights) + (max(heights) - min(heights)) / 3.0
+    legs = _legs(scene) if raised.any() else set()
+    for foot in np.flatnonzero(raised).tolist():
+        if legs and joints[foot] not in legs and not _touches(scene, q, joints[foot]):
+            raise InputError(
+                f"Balance: {feet[foot]!r} is {least[foot] - min(heights):.2f} m above the lowest joint at the "
+                "start and touches nothing, so it bears nothing; name what stands, such as "
+                "feet=['left_foot', 'right_foot'], or start where it bears"
+            )
+    low = height <= least[soles.foot] + STANDING_HEIGHT
     return points[low], soles.joints[low]
+
+
+def _carried(scene: Scene, feet: Sequence[str]) -> range:
+    """Joints of the figure that stands on some feet."""
+    return inputs.joints_with_mass(scene, "Balance", feet) or range(1, scene.model.njoints)
+
+
+def _legs(scene: Scene) -> set[int]:
+    """Joints of legs of persons."""
+    figure = scene.figure
+    groups = (f"{body}{side}_leg" for body in figure.bodies for side in ("left", "right"))
+    return {figure.joint_id(name) for group in groups for name in figure.groups.get(group, ())}
+
+
+def _touches(scene: Scene, q: Array, joint: int) -> bool:
+    """Whether what a joint carries is at a thing."""
+    pieces, owners = scene.geometry.geometryObjects, scene.piece_owner
+    beyond = {owners[k] for k, one in enumerate(pieces) if joint in scene.model.supports[one.parentJoint]}
+    pairs = ((owners[a], owners[b]) for a, b in scene.contacts(q, within=0.05).pair)  # m
+    return any(one in beyond and other in scene.objects for pair in pairs for one, other in (pair, pair[::-1]))
 
 
 def _soles_of(scene: Scene, feet: Sequence[str], bearing: Sequence[int]) -> _Soles:

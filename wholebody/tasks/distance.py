@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -139,10 +139,10 @@ class Effort(DistanceMeasure):
         return filled(self, distance=SquaredDistance.build(start, scene.figure.effort_weights))
 
 
-def without_freedoms(effort: Effort, idx_v: Sequence[int]) -> Effort:
-    """A resolved effort in which the displacements of those degrees of freedom cost nothing."""
+def scaled(effort: Effort, factors: Mapping[int, float]) -> Effort:
+    """A resolved effort with the weights at some places in the tangent multiplied by factors."""
     weights = effort.distance.weights.copy()
-    weights[list(idx_v)] = 0.0
+    weights[list(factors)] *= list(factors.values())
     return filled(effort, distance=SquaredDistance.build(effort.distance.reference, weights))
 
 

@@ -282,3 +282,38 @@ class Hang(SumOfSquares):
             found.append(equidistant_error(x, y, -z))
             moves.append(state.wrench_jacobian(Wrench(wrench, place.joint)))
         return np.concatenate(found), np.vstack(moves)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelHead(SumOfSquares):
+    """Squared sine of the angle by which a head is tilted to a side [no unit].
+
+    A person of whom a term places eyes or head has this measure by default: people keep their eyes level where a trunk
+    bends or a roof is low. By `Effort` alone a head would tilt, as lateral joints of the neck are cheaper than a bend.
+
+    Attributes:
+        frame: of the head, with x ahead.
+        weight: factor on the measure.
+        place: of the frame, once resolved.
+
+    Raises:
+        InputError: a weight out of range.
+        UnknownNameError: in a problem, a frame that the figure does not have.
+
+    Examples:
+        >>> level = wb.tasks.LevelHead()
+    """
+
+    frame: inputs.Name = "gaze"
+    weight: inputs.Weight = 40.0  # 10 degrees count as 1.2: ESTIMATE
+    place: inputs.Place = field(init=False, repr=False)
+
+    def resolve(self, scene: Scene, start: Array) -> LevelHead:
+        """Find the head."""
+        return filled(self, place=inputs.find_place(scene, self.frame, "LevelHead"))
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """The height of the axis to the left (1,), and its derivative (1, nv)."""
+        left = state.frame(self.place.frame).rotation[:, 1]
+        wrench = np.append(np.zeros(3), cross(left, UP))[None]
+        return left[2:], state.wrench_jacobian(Wrench(wrench, self.place.joint))

@@ -116,7 +116,7 @@ class ClipLoads:
     def gaps(self, frame: int, loads: Loads) -> tuple[Array, Array]:
         """Gaps of torques to their bounds (2 nv,), and of the zero moment point to its (e,); metres, see `LENGTH`."""
         bounds, stand, defects = self.bounds, self.stands[frame], self.defects
-        needed = loads.torque if defects is None else loads.torque + defects.torque[frame]
+        needed = loads.strained if defects is None else loads.strained + defects.torque[frame]
         with np.errstate(invalid="ignore"):
             high = LENGTH * (bounds.upper - needed) / bounds.upper
             low = LENGTH * (needed - bounds.lower) / -bounds.lower
@@ -162,7 +162,7 @@ class ClipLoads:
                     (dynamics, steady, stands[frame]),
                 )
             )
-            torque[frame] = seen.torque - recorded.torque
+            torque[frame] = seen.strained - recorded.strained
             pressed[frame] = seen.wrench[2] >= LIGHT * self.dynamics.weight and recorded.wrench[2] > 0.0
             if pressed[frame] and len(self.stands[frame].normals):
                 height = self.stands[frame].height
@@ -224,7 +224,7 @@ class ClipLoads:
         for frame in range(1, len(self.base) - 1):
             v, a = self.motion(*self.base[frame - 1 : frame + 2])
             found = self.dynamics.loads(self.base[frame], v, a, self.stands[frame])
-            lower, upper = np.minimum(lower, found.torque), np.maximum(upper, found.torque)
+            lower, upper = np.minimum(lower, found.strained), np.maximum(upper, found.strained)
             torque = slow @ self._parts(frame, slow)[0]
             least, most = np.minimum(least, torque), np.maximum(most, torque)
             leaning = self.leaning(self.stands[frame], found)
