@@ -132,6 +132,9 @@ class Descents:
                 others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
+                others = self.chain.singular(self.asked.goals, self.asked.nearest)
+                if len(others):  # what their samples do not meet is not out of reach
+                    return self._of_singular(others)
                 # Inequalities reject what is nearest: the search for the closest posture goes along them.
                 begins = None if self.asked.bounded else self._if_out_of_reach()
                 return None if begins is None else self._nearest(begins)
@@ -288,6 +291,13 @@ class Descents:
             if is_free(self.workspace, q, deep, within):
                 hardly.append(values)
         return hardly
+
+    def _of_singular(self, others: Array) -> Met | None:
+        """The first of postures (k, n) of a singular placement that is free; a descent goes on along the others."""
+        for values in others:
+            if self._is_free(q := self.chain.posture(values, self.asked.at)):
+                return Met(q, tuple(self.trace), False)
+        return None
 
     def _nearest(self, near: list[Array]) -> Met:
         """The closest postures of descents from the first seeds with everything held: a few, which differ."""
