@@ -293,9 +293,17 @@ class Descents:
         return hardly
 
     def _of_singular(self, others: Array) -> Met | None:
-        """The first of postures (k, n) of a singular placement that is free; a descent goes on along the others."""
+        """A free posture of a singular placement: one of samples (k, n), else beside one that hardly overlaps."""
+        at, clearances, gaps = self.asked.at, self.asked.clearances, list[float]()
         for values in others:
-            if self._is_free(q := self.chain.posture(values, self.asked.at)):
+            if self._is_free(q := self.chain.posture(values, at)):
+                return Met(q, tuple(self.trace), False)  # a descent goes on along the others
+            near = self.workspace.near(q, self.within)
+            gaps.append(float((near.distance - clearances[near.number]).min(initial=0.0)))
+        contacts = self._contacts()
+        for values in others[np.argsort(gaps)[: -SEEDS.together : -1]]:
+            found = None if self.control.over else contacts.least(values, np.inf, SEEDS.radius)
+            if found is not None and self._is_free(q := self.chain.posture(found[0].values, at)):
                 return Met(q, tuple(self.trace), False)
         return None
 

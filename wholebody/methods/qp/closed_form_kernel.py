@@ -98,11 +98,11 @@ def _angles(h: Vector, axis: Vector, v: Vector, d: float, slack: float, free: fl
 
 @compiled(inner=True)
 def _bent(
-    first: Vector, axis: Vector, second: Vector, v: Vector, far: Vector, slack: float, free: float
+    first: Vector, axis: Vector, second: Vector, v: Vector, far: Vector, slack: float
 ) -> tuple[int, float, float]:
     """Angles about an axis through `second` at which v is as far from `first` as `far` is (subproblem 3)."""
     x, y, z = _minus(second, first), _minus(v, second), _minus(far, first)
-    return _angles(x, axis, y, 0.5 * (_dot(z, z) - _dot(x, x) - _dot(y, y)), slack, free)
+    return _angles(x, axis, y, 0.5 * (_dot(z, z) - _dot(x, x) - _dot(y, y)), slack, 0.0)
 
 
 @compiled(inner=True)
@@ -140,12 +140,12 @@ def _with_wrist(kind: int, slack: float, free: float, h: Array, o: Array, place:
     if kind == PARALLEL:
         number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(wrist, o1)), slack, free)
     else:
-        number, one, other = _bent(o1, h3, o3, wrist, at, slack, free)
+        number, one, other = _bent(o1, h3, o3, wrist, at, slack)
     for outer in range(number):
         first = one if outer == 0 else other
         if kind == PARALLEL:
             back = _plus(o1, _turn(h1, -first, away))
-            count, low, high = _bent(o2, h3, o3, wrist, back, slack, free)
+            count, low, high = _bent(o2, h3, o3, wrist, back, slack)
         else:
             arm = _minus(_plus(o3, _turn(h3, first, _minus(wrist, o3))), o1)
             count, low, high = _angles(h1, h2, arm, _dot(h1, away), slack, free)
@@ -200,7 +200,7 @@ def _with_parallels(slack: float, free: float, h: Array, o: Array, place: Array,
                 turned = _turn(h1, -q1, _rotated(place, _turn(h6, -q6, _turn(h5, -q5, side))))
                 total = _between(h2, side, turned, 0.0)
                 elbow = _minus(back, _turn(h2, total, _minus(end, o4)))
-                both, up, down = _bent(o2, h3, o3, o4, elbow, slack, free)
+                both, up, down = _bent(o2, h3, o3, o4, elbow, slack)
                 if both > 0:
                     break
             for k in range(both):

@@ -209,7 +209,8 @@ class PlainChain:
         values, effort = self._sampled(goals, nearest, SEEDS.spread)[:2]
         alike = np.abs(values - values[0]).max(axis=2) <= NEARBY  # not for NaN
         some = np.flatnonzero((effort < np.inf) & ~alike)
-        return values.reshape(-1, len(self.idx_v))[some[effort.ravel()[some].argsort(kind="stable")]]
+        found: Array = values.reshape(-1, len(self.idx_v))[some[effort.ravel()[some].argsort(kind="stable")]]
+        return found
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof."""
