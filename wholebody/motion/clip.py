@@ -18,9 +18,9 @@ from wholebody.base.charts import Shown, new_chart, plain
 from wholebody.base.checks import array, instance, listed, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.mirroring import PLACEMENT, mirrored
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement, steady
-from wholebody.motion.mirroring import PLACEMENT, mirrored
 from wholebody.motion.resampling import splined
 
 ROOT_SIZE = 7  # values of a free root

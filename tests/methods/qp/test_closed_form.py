@@ -27,6 +27,8 @@ ARMS = {
     "wrist, shoulder crossing": ([Z, Y, X, Z, TILTED, X], ["free", 0, "free", "free", 0, 0]),
     "three parallel": ([Z, Y, Y, -Y, Z, TILTED], ["free", "free", "free", "free", "free", Z]),
     "wrist at the base": ([X, TILTED, Z, Y, Y, X], ["free", 0, 0, "free", "free", "free"]),
+    "straight wrist": ([Z, Y, X, X, Y, X], ["free", 0, "free", "free", 0, 0]),
+    "straight wrist at the base": ([X, Y, X, Y, Y, Z], ["free", 0, 0, "free", "free", "free"]),
     "shoulder, elbow and wrist": ([Z, Y, Z, -Y, Z, Y, Z], ["free", 0, Z, Z, Z, 0, 0]),
     "elbow and end beside": ([Z, Y, Z, -Y, Z, Y, Z], ["free", 0, Z, "free", Z, 0, "free"]),
     "no shoulder": ([Z, Y, X, Y, X, Y, X], ["free", "free", X, X, X, 0, X]),
@@ -249,6 +251,62 @@ def test_singular_placements_take_hardly_ever_more_effort_than_a_posture_that_is
                 more.append(wb.solve(problem).assessment.measure > 1.001 * wb.assess(problem, known).measure)
         assert len(more) > 30
         assert sum(more) <= 1
+
+
+def singular_posture(name: str, model: pin.Model, rng: np.random.Generator) -> np.ndarray:
+    """A posture (6,) with a straight wrist, or of "z1" with the crossing of its last axes above the first one."""
+    q, data = rng.uniform(-2.5, 2.5, 6), model.createData()
+    if name != "z1":
+        q[1 if "base" in name else 4] = 0.0
+        return q
+
+    def away(second: float) -> float:
+        pin.forwardKinematics(model, data, np.array([0.0, second, *q[2:]]))
+        return float(data.oMi[5].translation[0])
+
+    q = rng.uniform(model.lowerPositionLimit, model.upperPositionLimit)
+    q[2] = rng.uniform(-1.5, -1.0)
+    q[1] = scipy.optimize.brentq(away, 0.0, 2.9, xtol=1e-14)
+    return q
+
+
+@pytest.mark.parametrize("name", ["wrist, two parallel", "straight wrist", "straight wrist at the base", "ur5", "z1"])
+def test_samples_of_a_singular_placement_are_postures_of_it_all_the_way_to_the_one_that_is_known(name):
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        if name in ARMS:
+            model, chain = arm(name, rng, np.pi)
+        else:
+            model = (figure := known_arm(name)[0]).model
+            chain = PlainChain(model, figure.limits, tuple(range(1, 7)))
+        known, data, away = singular_posture(name, model, rng), model.createData(), np.inf
+        pin.forwardKinematics(model, data, known)
+        place = pin.SE3(data.oMi[6])
+        found = chain.singular(placed(goal_of(chain, place, pin.SE3.Identity())), np.array([known, np.ones(6)]))
+        for q in found:
+            pin.forwardKinematics(model, data, q)
+            away = min(away, np.abs(np.angle(np.exp(1j * (q - known)))).max())
+            assert np.abs(pin.log6(data.oMi[6].actInv(place)).vector).max() < 1e-7
+        assert away < 0.1, name
+        assert len(found) > 15
+
+
+def test_no_singular_placement_that_is_known_to_be_free_is_out_of_reach():
+    """Random boxes leave the known posture free: of 1,000 such placements of an arm 24 and 37 were called so."""
+    for name, seeds in (("ur10", (2, 5, 17, 95, 114, 138)), ("ur5", (138, 169, 209))):
+        figure, start = known_arm(name)
+        for seed in seeds:
+            rng, scene = np.random.default_rng(seed), wb.Scene(figure)
+            known = rng.uniform(-2.5, 2.5, 6) * (1, 1, 1, 1, 0, 1)
+            places = [np.asarray(figure.placement(known, joint).translation) for joint in figure.joints]
+            for number in range(int(rng.integers(15, 40))):
+                at = places[int(rng.integers(0, 6))] + rng.normal(0.0, 0.15, 3)
+                trial, box = wb.Scene(figure), wb.Box(tuple(rng.uniform(0.05, 0.3, 3)))
+                if not len(trial.add(box, name="box", at=at).contacts(known, 0.0).number):
+                    scene.add(box, name=f"box {number}", at=at)
+            problem = wb.Problem(scene, start, goals=[wb.Frame("tool", figure.placement(known, "tool"))])
+            assert wb.assess(problem, known).holds(1e-6)
+            assert wb.solve(problem).solved
 
 
 def test_goals_that_hardly_overlap_are_out_of_reach_and_missed_by_no_more_than_what_is_free_beside_them():

@@ -6,10 +6,12 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
 from wholebody.base.arrays import Array
+from wholebody.figures.mirroring import mirrored
 
 MOST = np.radians(10.0)  # largest change of a joint between neighbours
 
@@ -64,3 +66,34 @@ def test_two_hands_alike_leave_the_body_in_the_middle(height: float) -> None:
     angles = woman.joint_values(solution.q)
     for name in (name for name in angles if name.startswith("left_")):
         assert angles[name] == pytest.approx(angles[f"right_{name.removeprefix('left_')}"], abs=0.02)
+
+
+def test_who_may_lunge_to_either_side_lunges_to_the_left() -> None:
+    """Descents end in either of two mirror images, which are as good: of people side by side every other one."""
+    postures, crate = [], wb.Box((0.3, 0.4, 0.3))
+    for percentile, yaw in ((3.0, 0.0), (13.5, 0.0), (24.0, 0.0), (13.5, 0.8)):
+        figure = wb.load("human", sex="male", percentile=percentile)
+        place = pin.SE3(pin.utils.rotate("z", yaw), np.array([0.4, -0.7, 0.0]) * (yaw > 0.0))
+        start = figure.neutral.copy()
+        start[:7] = pin.SE3ToXYZQUAT(place.act(pin.XYZQUATToSE3(start[:7])))
+        scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+        scene.add(crate, name="crate", at=place.act(pin.SE3(np.eye(3), np.array([0.45, 0.0, 0.16]))))
+        goals = [wb.Grasp(side, "crate") for side in ("left", "right")]
+        measures = [wb.Effort(), wb.tasks.Rhythm(style="free")]
+        problem = wb.Problem(scene, start, goals=goals, constraints=[wb.Stand("floor")], measures=measures)
+        solution = wb.solve(problem)
+        assert solution.solved
+        postures.append(solution.q)
+    assert max(changes(figure, postures)) < MOST
+
+
+def test_mirror_images_at_a_place_are_those_at_the_origin_moved_there() -> None:
+    figure, rng = wb.load("human"), np.random.default_rng(0)
+    place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+    q = pin.integrate(figure.model, figure.neutral, rng.normal(0.0, 0.3, figure.model.nv))
+    moved = q.copy()
+    moved[:7] = pin.SE3ToXYZQUAT(place.act(pin.XYZQUATToSE3(q[:7])))
+    image, there = mirrored(figure, q[None])[0], mirrored(figure, moved[None], place)[0]
+    for name in ("left_palm", "right_ankle", "head"):
+        expected = place.act(figure.placement(image, name))
+        assert expected.isApprox(figure.placement(there, name), 1e-9)

@@ -132,6 +132,9 @@ class Descents:
                 others = branches.least[max(len(ends) - self.chain.first, 0) :]
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
+                others = self.chain.singular(self.asked.goals, self.asked.nearest)
+                if len(others):  # what their samples do not meet is not out of reach
+                    return self._of_singular(others)
                 # Inequalities reject what is nearest: the search for the closest posture goes along them.
                 begins = None if self.asked.bounded else self._if_out_of_reach()
                 return None if begins is None else self._nearest(begins)
@@ -288,6 +291,21 @@ class Descents:
             if is_free(self.workspace, q, deep, within):
                 hardly.append(values)
         return hardly
+
+    def _of_singular(self, others: Array) -> Met | None:
+        """A free posture of a singular placement: one of samples (k, n), else beside one that hardly overlaps."""
+        at, clearances, gaps = self.asked.at, self.asked.clearances, list[float]()
+        for values in others:
+            if self._is_free(q := self.chain.posture(values, at)):
+                return Met(q, tuple(self.trace), False)  # a descent goes on along the others
+            near = self.workspace.near(q, self.within)
+            gaps.append(float((near.distance - clearances[near.number]).min(initial=0.0)))
+        contacts = self._contacts()
+        for values in others[np.argsort(gaps)[: -SEEDS.together : -1]]:
+            found = None if self.control.over else contacts.least(values, np.inf, SEEDS.radius)
+            if found is not None and self._is_free(q := self.chain.posture(found[0].values, at)):
+                return Met(q, tuple(self.trace), False)
+        return None
 
     def _nearest(self, near: list[Array]) -> Met:
         """The closest postures of descents from the first seeds with everything held: a few, which differ."""

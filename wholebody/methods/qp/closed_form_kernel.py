@@ -23,6 +23,8 @@ axes 5 and 6 cross in o_6."""
 BRANCHES = 8
 FULL = 2.0 * np.pi
 SLACK = 1e-6  # rad and a share: a stretched arm and a joint at its limit are found in spite of rounding
+ALONG = 1e-10  # product of lengths across an axis below which an angle about it is free: 1e-5 rad or m each
+SPREAD = 89  # times a free angle are those of joints behind: both may be free, and are seen in all combinations
 BETWEEN = 0.2  # rad: beyond limits, of a sample; what is within them may lie between it and the next one
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -74,20 +76,23 @@ def _turn(axis: Vector, angle: float, v: Vector) -> Vector:
 
 
 @compiled(inner=True)
-def _between(axis: Vector, a: Vector, b: Vector) -> float:
-    """The angle about an axis that turns a to b, or to where it is nearest to b (subproblem 1)."""
-    return float(np.arctan2(_dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b)))
+def _between(axis: Vector, a: Vector, b: Vector, free: float) -> float:
+    """The angle about an axis that turns a to b, or to where it is nearest to b (subproblem 1); `free` for any."""
+    across, along = _dot(axis, _cross(a, b)), _dot(a, b) - _dot(axis, a) * _dot(axis, b)
+    return free if across * across + along * along < ALONG * ALONG else float(np.arctan2(across, along))
 
 
 @compiled(inner=True, error_model="numpy")
-def _angles(h: Vector, axis: Vector, v: Vector, d: float, slack: float) -> tuple[int, float, float]:
-    """How many angles about an axis turn v to where h . v = d, and both of them (subproblem 4)."""
+def _angles(h: Vector, axis: Vector, v: Vector, d: float, slack: float, free: float) -> tuple[int, float, float]:
+    """How many angles about an axis turn v to where h . v = d, and both of them (subproblem 4); `free` for any."""
     along = _dot(h, axis) * _dot(axis, v)
     a, b, c = _dot(h, v) - along, _dot(h, _cross(axis, v)), d - along
     most = np.sqrt(a * a + b * b)
     if not abs(c) <= most * (1.0 + slack) + slack * slack:
         return 0, 0.0, 0.0
-    middle, side = np.arctan2(b, a), np.arccos(min(max(c / most, -1.0), 1.0)) if most > 0.0 else 0.0
+    if most * most < ALONG:
+        return 2, free, free + np.pi
+    middle, side = np.arctan2(b, a), np.arccos(min(max(c / most, -1.0), 1.0))
     return 2, middle + side, middle - side
 
 
@@ -97,7 +102,7 @@ def _bent(
 ) -> tuple[int, float, float]:
     """Angles about an axis through `second` at which v is as far from `first` as `far` is (subproblem 3)."""
     x, y, z = _minus(second, first), _minus(v, second), _minus(far, first)
-    return _angles(x, axis, y, 0.5 * (_dot(z, z) - _dot(x, x) - _dot(y, y)), slack)
+    return _angles(x, axis, y, 0.5 * (_dot(z, z) - _dot(x, x) - _dot(y, y)), slack, 0.0)
 
 
 @compiled(inner=True)
@@ -127,13 +132,13 @@ def _across(h: Vector) -> Vector:
 
 
 @compiled(inner=True, error_model="numpy")
-def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, found: Array) -> None:
+def _with_wrist(kind: int, slack: float, free: float, h: Array, o: Array, place: Array, found: Array) -> None:
     """The branches (8, 6) of an arm whose last axes cross; the place of their crossing comes first."""
     h1, h2, h3, o1, o2, o3 = _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(o, 0), _vector(o, 1), _vector(o, 2)
     wrist, at = _vector(o, 5), _plus(_rotated(place, _vector(o, 5)), _vector(place, 3))
     away = _minus(at, o1)
     if kind == PARALLEL:
-        number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(wrist, o1)), slack)
+        number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(wrist, o1)), slack, free)
     else:
         number, one, other = _bent(o1, h3, o3, wrist, at, slack)
     for outer in range(number):
@@ -143,19 +148,19 @@ def _with_wrist(kind: int, slack: float, h: Array, o: Array, place: Array, found
             count, low, high = _bent(o2, h3, o3, wrist, back, slack)
         else:
             arm = _minus(_plus(o3, _turn(h3, first, _minus(wrist, o3))), o1)
-            count, low, high = _angles(h1, h2, arm, _dot(h1, away), slack)
+            count, low, high = _angles(h1, h2, arm, _dot(h1, away), slack, free)
         for inner in range(count):
             second = low if inner == 0 else high
             if kind == PARALLEL:
                 arm = _minus(_plus(o3, _turn(h3, second, _minus(wrist, o3))), o2)
-                q1, q2, q3 = first, _between(h2, arm, _minus(back, o2)), second
+                q1, q2, q3 = first, _between(h2, arm, _minus(back, o2), free), second
             else:
-                q1, q2, q3 = _between(h1, _turn(h2, second, arm), away), second, first
-            _turned_wrist(h, place, (q1, q2, q3), slack, found[4 * outer + 2 * inner : 4 * outer + 2 * inner + 2])
+                q1, q2, q3 = _between(h1, _turn(h2, second, arm), away, free), second, first
+            _turned_wrist(h, place, (q1, q2, q3), slack, free, found[4 * outer + 2 * inner : 4 * outer + 2 * inner + 2])
 
 
 @compiled(inner=True)
-def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, found: Array) -> None:
+def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, free: float, found: Array) -> None:
     """The two branches (2, 6) to turn a wrist where the first three angles are known."""
     h1, h2, h3, h4, h5, h6 = (
         _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 3), _vector(h, 4), _vector(h, 5),
@@ -164,44 +169,43 @@ def _turned_wrist(h: Array, place: Array, first: Vector, slack: float, found: Ar
     asked = _turn(h3, -q3, _turn(h2, -q2, _turn(h1, -q1, _rotated(place, h6))))
     side = _across(h6)
     turned = _turn(h3, -q3, _turn(h2, -q2, _turn(h1, -q1, _rotated(place, side))))
-    count, low, high = _angles(h4, h5, h6, _dot(h4, asked), slack)
+    count, low, high = _angles(h4, h5, h6, _dot(h4, asked), slack, free)
     for k in range(count):
         q5 = low if k == 0 else high
-        q4 = _between(h4, _turn(h5, q5, h6), asked)
-        q6 = _between(h6, side, _turn(h5, -q5, _turn(h4, -q4, turned)))
+        q4 = _between(h4, _turn(h5, q5, h6), asked, SPREAD * free)
+        q6 = _between(h6, side, _turn(h5, -q5, _turn(h4, -q4, turned)), 0.0)
         found[k, 0], found[k, 1], found[k, 2], found[k, 3], found[k, 4], found[k, 5] = q1, q2, q3, q4, q5, q6
 
 
 @compiled(inner=True, error_model="numpy")
-def _with_parallels(slack: float, h: Array, o: Array, place: Array, found: Array) -> None:
+def _with_parallels(slack: float, free: float, h: Array, o: Array, place: Array, found: Array) -> None:
     """The branches (8, 6) of an arm whose axes 2 to 4 are parallel."""
     h1, h2, h3, h5, h6 = _vector(h, 0), _vector(h, 1), _vector(h, 2), _vector(h, 4), _vector(h, 5)
     o1, o2, o3, o4, end = _vector(o, 0), _vector(o, 1), _vector(o, 2), _vector(o, 3), _vector(o, 5)
     third, fourth = _dot(h2, h3), _dot(h2, _vector(h, 3))
     away, side = _minus(_plus(_rotated(place, end), _vector(place, 3)), o1), _across(h2)
-    number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(end, o1)), slack)
+    number, one, other = _angles(h2, (-h1[0], -h1[1], -h1[2]), away, _dot(h2, _minus(end, o1)), slack, free)
     for outer in range(number):
         q1 = one if outer == 0 else other
         back = _plus(o1, _turn(h1, -q1, away))
-        count, low, high = _angles(h2, h5, h6, _dot(h2, _turn(h1, -q1, _rotated(place, h6))), slack)
+        count, low, high = _angles(h2, h5, h6, _dot(h2, _turn(h1, -q1, _rotated(place, h6))), slack, free)
         for inner in range(count):
             q5 = low if inner == 0 else high
             asked = _rotated_back(place, _turn(h1, q1, h2))
             across = _cross(h6, asked)
-            free = _dot(across, across) < 1e-10  # axes 2 and 6 are parallel to 1e-5 rad: any q6 meets the rotation
-            for k in range(16 if free else 1):  # to the first with which the arm is long enough
-                q6 = _between(h6, asked, _turn(h5, -q5, h2))
-                if free:
-                    q6 = np.pi * inner + FULL / 16 * ((k + 1) // 2) * (2 * (k % 2) - 1)
+            parallel = _dot(across, across) < ALONG  # axes 2 and 6: any q6 meets the rotation
+            for k in range(16 if parallel else 1):  # to the first with which the arm is long enough
+                q6 = SPREAD * free + np.pi * inner + FULL / 16 * ((k + 1) // 2) * (2 * (k % 2) - 1)
+                q6 = q6 if parallel else _between(h6, asked, _turn(h5, -q5, h2), 0.0)
                 turned = _turn(h1, -q1, _rotated(place, _turn(h6, -q6, _turn(h5, -q5, side))))
-                total = _between(h2, side, turned)
+                total = _between(h2, side, turned, 0.0)
                 elbow = _minus(back, _turn(h2, total, _minus(end, o4)))
                 both, up, down = _bent(o2, h3, o3, o4, elbow, slack)
                 if both > 0:
                     break
             for k in range(both):
                 q3 = up if k == 0 else down
-                q2 = _between(h2, _minus(_plus(o3, _turn(h3, q3, _minus(o4, o3))), o2), _minus(elbow, o2))
+                q2 = _between(h2, _minus(_plus(o3, _turn(h3, q3, _minus(o4, o3))), o2), _minus(elbow, o2), free)
                 row = found[4 * outer + 2 * inner + k]
                 row[0], row[1], row[2], row[3], row[4], row[5] = q1, q2, q3, fourth * (total - q2 - third * q3), q5, q6
 
@@ -213,7 +217,7 @@ def branches(arm: Arm, goal: Array, values: Array, found: Array) -> None:
     Args:
         arm: the axes.
         goal: (36,) the placement, and that of the frame in the joint, as in `terms.entries.RESIDUAL`.
-        values: (v,) of the joint that is held; their number alone counts where none is.
+        values: (v,) of the joint that is held; where none is, of those that are free where axes line up.
         found: (v, 8, n) written: angles in the order of the chain, NaN where a branch does not exist.
     """
     place, asked, six = np.empty((4, 3)), np.empty((4, 3)), np.empty((BRANCHES, 6))
@@ -240,10 +244,11 @@ def branches(arm: Arm, goal: Array, values: Array, found: Array) -> None:
             o[k, 0], o[k, 1], o[k, 2] = point
             k += 1
         six[:] = np.nan
+        free = values[number] if arm.held < 0 else 0.0
         if arm.kind == THREE_PARALLEL:
-            _with_parallels(arm.slack, h, o, place, six)
+            _with_parallels(arm.slack, free, h, o, place, six)
         else:
-            _with_wrist(arm.kind, arm.slack, h, o, place, six)
+            _with_wrist(arm.kind, arm.slack, free, h, o, place, six)
         for b in range(BRANCHES):
             k = 0
             for i in range(len(arm.joints)):
@@ -282,7 +287,8 @@ def sampled(
 ) -> int:  # fmt: skip
     """Which postures within limits take less effort than the samples beside them in their branch, the least first.
 
-    Samples are those of the joint that is held, all over its limits, or over a whole turn of them about a posture.
+    Samples are those of the joint that is held, all over its limits, or over a whole turn of them about a posture; of
+    six joints, whole turns of those that are free where axes line up.
 
     Args:
         arm: the axes.
@@ -308,11 +314,13 @@ def sampled(
         high = min(low + FULL, upper[joint])
         for v in range(len(values)):
             values[v] = low + (high - low) * v / (len(values) - 1)
+    for v in range(0 if arm.held >= 0 else len(values)):
+        values[v] = FULL * v / len(values)
     branches(arm, goal, values, found)
     count, number = 0, len(found)
     for b in range(BRANCHES):
         for v in range(number):
-            effort[v, b] = within(found[v, b], lower, upper, near, BETWEEN if number > 1 else SLACK)
+            effort[v, b] = within(found[v, b], lower, upper, near, BETWEEN if arm.held >= 0 else SLACK)
         for v in range(number):
             own = effort[v, b]
             if own == np.inf or (v > 0 and effort[v - 1, b] <= own) or (v + 1 < number and effort[v + 1, b] < own):

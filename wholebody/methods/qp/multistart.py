@@ -69,11 +69,11 @@ class QPMultistart(Search):
         self._find_closest()
         self._go_on()
         self._seek_lower(max(self.settings.restarts_for_measure, SEARCH.poor if self._descend_again() else 0))
+        self._to_the_left()
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than the tolerance
-        if self.out_of_reach:  # although a closer posture may be near
-            self._best = with_values(self.best, converged=True)
-        return with_values(self.best, converged=False) if self.control.reason else self.best
+        settled = self.out_of_reach or self.best.converged  # although a closer posture may be near
+        return with_values(self.best, converged=settled and not self.control.reason)
 
     def enough(self) -> bool:
         """Whether the programs are spent, all minima found, or the best is known to be the closest to the goals."""

@@ -170,16 +170,19 @@ class PlainChain:
     def branches(self, goals: Goals, nearest: Array) -> Branches:
         """The branches of the closed form for one frame's placement; `nearest` as in `closed_form_kernel.sampled`."""
         # With six joints these are all postures; with seven samples of one joint.
-        count = 0
         for samples in self.samples:
-            if not count:
-                found, effort = np.empty((samples, BRANCHES, len(self.idx_v))), np.empty((samples, BRANCHES))
-                order = np.empty(effort.size, dtype=np.intp)
-                count = closed_form_kernel().sampled(
-                    self.guide, goals.tables[0], (self.chain.lower, self.chain.upper), nearest, found, effort, order
-                )
+            found, effort, order = self._sampled(goals, nearest, samples)
+            if len(order):
+                break
         values = found.reshape(-1, len(self.idx_v))
-        return Branches(values, effort.ravel(), values[order[:count]])
+        return Branches(values, effort.ravel(), values[order])
+
+    def _sampled(self, goals: Goals, nearest: Array, samples: int) -> tuple[Array, Array, Indices]:
+        """See `closed_form_kernel.sampled`."""
+        found, effort = np.empty((samples, BRANCHES, len(self.idx_v))), np.empty((samples, BRANCHES))
+        limits, order = (self.chain.lower, self.chain.upper), np.empty(effort.size, dtype=np.intp)
+        count = closed_form_kernel().sampled(self.guide, goals.tables[0], limits, nearest, found, effort, order)
+        return found, effort, order[:count]
 
     def downhill(self, branches: Branches, most: float) -> tuple[Indices, Array]:
         """Samples (k,) from which branches fall below an effort, and ways (k, 2): see `branch_kernel.downhill`."""
@@ -199,6 +202,15 @@ class PlainChain:
         bodies = self.chain, self.guide, self.room(rows_of(goals)), self.arm is not None
         branch_kernel.along(bodies, asked, goals, nearest, most, samples, towards, (ends, efforts))
         return ends, efforts
+
+    def singular(self, goals: Goals, nearest: Array) -> Array:
+        """Postures (k, n) all over those that six joints meet a singular placement with, the least effort first."""
+        # Where axes line up postures are not isolated: of each continuum the closed form's branches have one.
+        values, effort = self._sampled(goals, nearest, SEEDS.spread)[:2]
+        alike = np.abs(values - values[0]).max(axis=2) <= NEARBY  # not for NaN
+        some = np.flatnonzero((effort < np.inf) & ~alike)
+        found: Array = values.reshape(-1, len(self.idx_v))[some[effort.ravel()[some].argsort(kind="stable")]]
+        return found
 
     def loosely_met(self, goals: Goals, seed: int) -> Array:
         """Postures (k, n) that six joints meet a placement or one nearby with, or nearly so; none is a proof."""

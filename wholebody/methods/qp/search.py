@@ -9,6 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, with_values
+from wholebody.base.errors import InputError
+from wholebody.figures.mirroring import mirrored
 from wholebody.methods.control import Control
 from wholebody.methods.qp.closest import Closest
 from wholebody.methods.qp.feasibility import Feasibility
@@ -136,6 +138,28 @@ class Search(Multistart[LocalSolution]):
         if local.violation.worst <= tolerance and local.measure < SEARCH.lower * before:
             self.accept(self._descend(local.q))
         return self.best.measure < SEARCH.moved * before
+
+    def _to_the_left(self) -> None:
+        """Take the mirror image of an answer whose right leg is bent more, where it is as good, from a straight start.
+
+        Of lunges to either side, which are as good, descents end in one or the other: people much alike end alike.
+        """
+        figure, q, tolerance = self.problem.scene.figure, self.best.q, self.settings.tolerance
+        legs = [figure.dofs(side) for side in ("left_leg", "right_leg") if side in figure.groups]
+        bent = [np.linalg.norm(pin.difference(figure.model, figure.neutral, q)[leg]) for leg in legs]
+        if figure.root != "free" or len(bent) < 2 or bent[0] >= bent[1]:
+            return
+        if self.best.violation.worst > tolerance or not self.settings.measures or self.control.over:
+            return
+        try:
+            start, there = mirrored(figure, np.array([self._start, q]), pin.XYZQUATToSE3(self._start[:7]))
+        except InputError:  # a figure that is not symmetric
+            return
+        if np.abs(start - self._start).max() > 1e-3 or self._left_at(there) > 1e-3:  # m, rad
+            return
+        local = self._descend(there)
+        if local.violation.worst <= tolerance and local.measure <= self.best.measure / SEARCH.lower:
+            self._best = local
 
     def _aside(self, q: Array, share: float) -> Array:
         """Beside a posture (nq,): left legs are bent more than right ones; what has no legs is moved at random.

@@ -101,6 +101,7 @@ class SeedNumbers(NamedTuple):
     compared: int = 5  # ends of which the one of least effort is taken. More: less effort, more time.
     samples: int = 24  # values of the joint of seven that a closed form holds. More: less effort, more time.
     finer: int = 96  # the same where no posture of these is within limits. More: random seeds are tried less often.
+    spread: int = 144  # values of joints that a singular placement leaves free, of Fibonacci. More: more is found.
     worth: float = 0.9  # share of the effort of an answer below which a rejected end is descended from too
     ahead: float = 0.05  # m: least gap of a posture along a branch that counts as this. Less: edges take more looks.
     edge: float = 3e-6  # m: gap at which such a posture is at the edge of what is free. Less: less effort, more looks.

@@ -39,12 +39,20 @@ def other_side(name: str) -> str:
     return name
 
 
-def mirrored(figure: Figure, q: Array) -> Array:
-    """Postures (n, nq) mirrored at the plane y = 0; InputError for a figure that is not symmetric, or ball joints."""
+def mirrored(figure: Figure, q: Array, place: pin.SE3 | None = None) -> Array:
+    """Postures (n, nq) mirrored at the plane y = 0 of the world, or of a place for the free root.
+
+    Raises:
+        InputError: the figure is not symmetric, or has ball joints.
+    """
     source, sign = _exchange(one_figure(figure, "mirrored: the clip's figure"))
     found: Array = q[:, source] * sign
     if figure.root == "free":
         found[:, :7] = q[:, :7] * PLACEMENT
+    if figure.root == "free" and place is not None:
+        for row, given in zip(found, q[:, :7], strict=True):
+            image = pin.SE3ToXYZQUAT(place.actInv(pin.XYZQUATToSE3(given))) * PLACEMENT
+            row[:7] = pin.SE3ToXYZQUAT(place.act(pin.XYZQUATToSE3(image)))
     return found
 
 
