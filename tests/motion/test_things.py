@@ -133,6 +133,43 @@ def test_two_hands_stay_on_a_bar(stature: float, far: float) -> None:
     assert wb.check(clip, scene).free
 
 
+@pytest.mark.parametrize("stature", [1.5, 1.7])
+def test_hands_that_come_to_a_thin_bar_stay_on_it(stature: float, tmp_path: Path) -> None:
+    """Steps that are right for the place of a hand turn it through a bar of 32 mm: hands let go of it, or got stuck."""
+    man, postures = wb.load("human", sex="male", stature=1.85), []
+    for frame in range(36):
+        share = 0.5 - 0.5 * np.cos(np.pi * min(max((frame - 8) / 12, 0.0), 1.0))
+        angles = {"shoulder_flexion": 0.9 * share, "elbow_flexion": 0.6 * share}
+        named = {f"{side}_{joint}": angle for joint, angle in angles.items() for side in ("left", "right")}
+        postures.append(man.with_joints(man.posture("standing"), named))
+    wb.Clip(man, np.array(postures), 1 / 30, "bar").write(tmp_path / "bar.bvh")
+    data = man.model.createData()
+    pin.framesForwardKinematics(man.model, data, postures[-1])
+    palms = [data.oMf[man.frame_id(f"{side}_palm")].translation for side in ("left", "right")]
+    at = pin.SE3(pin.utils.rotate("x", 0.5 * np.pi), 0.5 * (palms[0] + palms[1]) - [0.0, 0.0, 0.035])
+    figure = wb.load("human", stature=stature)
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor").add(wb.Cylinder(0.016, 1.4), name="bar", at=at)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*(does not reach|overlap)")
+        clip = wb.retarget(wb.motion.read_skeleton(tmp_path / "bar.bvh"), figure, scene)
+    assert wb.check(clip, scene).free
+    bar = coal.Cylinder(0.016, 1.4), coal.Transform3s(at.rotation, at.translation)
+    placed, joints, geometry = figure.geometry.createData(), figure.model.createData(), figure.geometry
+    hands = [[k for k, piece in enumerate(geometry.geometryObjects) if piece.parentJoint == figure.model.frames[
+        figure.frame_id(f"{side}_palm")].parentJoint] for side in ("left", "right")]  # fmt: skip
+    for q in clip.q[26:]:
+        pin.updateGeometryPlacements(figure.model, joints, geometry, placed, q)
+        for hand in hands:
+            gaps = [
+                coal.distance(
+                    geometry.geometryObjects[k].geometry,
+                    coal.Transform3s(placed.oMg[k].rotation, placed.oMg[k].translation), *bar,
+                    coal.DistanceRequest(), coal.DistanceResult(),
+                ) for k in hand
+            ]  # fmt: skip
+            assert 0.0 < min(gaps) < 2e-3
+
+
 def robot(folder: Path, forearm: float | None = None) -> wb.Figure:
     """A robot of 1.75 m without hands: an arm ends beyond two joints of its wrist, which are 8 cm apart.
 
@@ -222,7 +259,7 @@ def test_the_floor_is_below_a_place_right_beside_a_table() -> None:
 
 def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsRecorder) -> None:
     motion, track = lifting(30)
-    figure = wb.load("human", stature=1.4)
+    figure = wb.load("human", stature=1.3)
     scene = among(figure, track[0]).add(wb.Box((0.1, 0.1, 0.1)), name="post", at=(3.0, 3.0, 0.05))
     clip = wb.retarget(motion, figure, scene, things={"box": track})  # beside the post the box keeps its way
     assert clip.things["box"][:, :3] == pytest.approx(np.array([at.translation for at in track]))
@@ -237,7 +274,8 @@ def test_what_is_out_of_reach_is_said_and_let_go_of(recwarn: pytest.WarningsReco
         assert away[:first].max() < 5e-3
         assert far == round(1e3 * away.max())
     assert wb.check(clip, scene).colliding == 0
-    assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.15  # the body does not go after it
+    assert np.abs(clip.q[:, :3] - clip.q[0, :3]).max() < 0.2  # the body leans, and does not go after it
+    assert np.abs(clip.q[-1, :3] - clip.q[0, :3]).max() < 0.05
 
 
 def test_round_things_rise_by_the_scale_of_what_is_below_them() -> None:

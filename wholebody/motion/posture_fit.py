@@ -37,6 +37,7 @@ NEAR, DEEP = 0.05, 1e-2  # rad, m: change of a value by a step that may meet oth
 FAR, SHORTER = 0.5, 0.3  # rad, m: change of a value by a step that is looked at; share of it that the next try may take
 PASSING, SPARE = 0.01, 1e-4  # m: the same between frames
 PUSH = 0.03  # m: by which a step brings an overlap out at most
+ASIDE = 10.0  # merit that a long step of what touches things may end with: it is 2 cm off, as its way is curved
 LEAST_LEVER = 0.1  # m
 WHOLE = 4.0, 2.0  # weights of a root's places and turns: they move the whole mass, so that legs give way first
 BONES = {"hand": 0.5, "toe": 0.7, "head": 0.7}  # weights of bones by their far ends, where it is not 1
@@ -89,6 +90,7 @@ class Fitter:
             joint for piece in figure.geometry.geometryObjects for joint in self.model.supports[piece.parentJoint]
         }
         bare = [bool(point.thing) and point.joint not in bearing for point in layout.held]
+        self._touching = np.array([point.thing for point in layout.held], dtype=bool)
         self._bare = np.repeat(np.array(bare, dtype=bool), 3)
         self._turn_joints, self._turn_parts = self._carried(layout.turns)
         moved = self._state.support[[*self._place_joints, *self._turn_joints]]
@@ -234,24 +236,32 @@ class Fitter:
         """
         found = self.step(q, goals, most=most, midway=midway)
         far = float(np.abs(pin.difference(self.model, q, found)).max())
-        if far <= NEAR or (far <= FAR and self.depth(found) <= DEEP):
+        touching = self.touching(goals)
+        if far <= NEAR or (far <= FAR and not touching and self.depth(found) <= DEEP):
             return found
         deepest, bounds = max(self.depth(q), DEEP), (-np.inf, np.inf) if most is None else most
+        before = self.merit(q, goals)
+        worst = max(before, ASIDE) if touching else np.inf
         if far <= FAR:
-            again = self.step(q, goals, most=most, midway=midway, within=FARTHER)
-            found = min(found, again, key=lambda each: self._merit(each, goals))
-            if self.depth(found) <= deepest:
+            if self.depth(found) <= DEEP and self.merit(found, goals) <= worst:
                 return found
-        before = self._merit(q, goals)
+            again = self.step(q, goals, most=most, midway=midway, within=FARTHER)
+            found = min(found, again, key=lambda each: self.merit(each, goals))
+            if self.depth(found) <= deepest and self.merit(found, goals) <= worst:
+                return found
         for _ in range(4):
-            if self._merit(found, goals) <= before and self.depth(found) <= deepest:
+            if self.merit(found, goals) <= before and self.depth(found) <= deepest:
                 return found
             far *= SHORTER
             reach = np.clip(np.outer((-far, far), np.ones(self.model.nv)), bounds[0], bounds[1])
             found = self.step(q, goals, most=reach, midway=midway, within=FARTHER)
         return q
 
-    def _merit(self, q: Array, goals: Goals) -> float:
+    def touching(self, goals: Goals) -> bool:
+        """Whether parts are to touch things, or are led to them."""
+        return bool(goals.held_weights[self._touching].any())
+
+    def merit(self, q: Array, goals: Goals) -> float:
         """The cost of a posture (nq,) with overlaps, which cost as much as what is held most firmly."""
         over = np.minimum(self._workspace.near(q, CLEARANCE).distance - CLEARANCE, 0.0)
         return self.cost(q, goals) + 0.5 * float(goals.held_weights.max(initial=1.0)) ** 2 * float(over @ over)

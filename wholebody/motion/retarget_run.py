@@ -37,8 +37,8 @@ from wholebody.motion.structure import upright
 from wholebody.motion.windows import leaning, normal
 from wholebody.scene.workspace import Workspace
 
-# most steps of a first frame, a free one, one of the first pass, one of a sweep
-FIRST, FREE, FORWARD, SWEEP = 60, 2, 3, 1
+# most steps of a first frame, a free one, one of the first pass, one there in which parts touch things, one of a sweep
+FIRST, FREE, FORWARD, TOUCHING, SWEEP = 60, 2, 3, 12, 1
 EVERY, WORTH = 0.25, 0.8  # s after which a free posture is sought anew, and the share of the cost that it is for
 SLOWING = 0.2  # s before it would be too fast in which a joint begins to move
 STARTS = 4  # how often the first frame is solved, each time from where soles came down beside each other
@@ -291,6 +291,8 @@ class Run:
         for _ in range(1 if k else STARTS):
             held = holds.goals(k, self._paths, shift, span=span)
             goals = self._goals(k, reference, CHANGE / dt**0.5 * self.levers, held)
+            if before is not None and self.fitter.touching(goals):  # what goes on may be deep in a thin thing
+                q = min((q, before), key=lambda each: self.fitter.merit(each, goals))
             q = self._settled(q, goals, before)
             if holds.lost(k, q, self.fitter.held(q), held):
                 q = self._settled(self.fitter.reached(before, reference, span * self.most), goals, before)
@@ -307,12 +309,11 @@ class Run:
 
     def _settled(self, q: Array, goals: Goals, before: Array | None) -> Array:
         """The posture (nq,) after the steps of a frame of the first pass."""
-        for _ in range(FIRST if before is None else FORWARD):
+        for _ in range(FIRST if before is None else TOUCHING if self.fitter.touching(goals) else FORWARD):
             if before is None:
                 goals = with_values(goals, posture=q)
             following = self.fitter.careful_step(q, goals, self._room(q, before, self.span))
-            moved = float(np.abs(pin.difference(self.model, q, following)).max())
-            q = following
+            moved, q = float(np.abs(pin.difference(self.model, q, following)).max()), following
             if moved < 1e-3:  # rad, m
                 break
         return q
@@ -341,8 +342,7 @@ class Run:
             return
         near = [self._near(k + j * span, span) for j in range(-2, 3)]
         smooth = (4.0 * (near[1] + near[3]) - (near[0] + near[4])) / 6.0
-        wanted = near[2] + omega * (smooth - near[2])
-        reference = np.asarray(pin.integrate(self.model, self._free[k], wanted))
+        reference = np.asarray(pin.integrate(self.model, self._free[k], near[2] + omega * (smooth - near[2])))
         self.fitter.see(self.holds.moved(k))
         if k not in self._held or self._held[k][0] != span:
             self._held[k] = span, self.holds.goals(k, self._paths, np.zeros(3), again=True, span=span)

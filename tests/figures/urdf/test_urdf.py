@@ -375,3 +375,16 @@ def test_a_joint_whose_upper_limit_is_minus_zero_is_one_that_does_not_move(tmp_p
         solution = wb.solve(wb.Problem(wb.Scene(robot), goals=[wb.Point("l3", tip)]), method=method)
         assert solution.q[1] == 0.0
         assert not np.signbit([robot.model.lowerPositionLimit, robot.model.upperPositionLimit])[:, 1].any()
+
+
+@pytest.mark.parametrize("root", [None, "free", "fixed"])
+def test_a_file_that_floats_on_an_empty_link_has_one_root(root, tmp_path):
+    """As the maker's H1 does, for MuJoCo: it went about on two free joints, one on the other."""
+    text = """<robot name="r"><link name="world"/><link name="pelvis"><inertial><mass value="1"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link><link name="leg"/>
+    <joint name="floating_base" type="floating"><parent link="world"/><child link="pelvis"/></joint>
+    <joint name="hip" type="continuous"><parent link="pelvis"/><child link="leg"/><axis xyz="0 1 0"/></joint></robot>"""
+    figure = load(write(tmp_path, text), **({} if root is None else {"root": root}))
+    assert figure.joints == ("hip",)
+    assert figure.root == (root or "free")
+    assert figure.model.nv == (1 if root == "fixed" else 7)

@@ -192,9 +192,10 @@ def urdf_figure(
         raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
     folders = [package_dirs] if isinstance(package_dirs, (str, PathLike)) else package_dirs
     urdf = read_urdf(Path(path), [Path(folder) for folder in folders])
+    urdf, floats = _without_world(urdf)
     extension = urdf.extension
     if root is None:
-        root = "free" if extension is not None and extension.get("root") == "free" else "fixed"
+        root = "free" if floats or (extension is not None and extension.get("root") == "free") else "fixed"
     model, remarks = urdf_model(urdf, root)
     check_size(model, urdf.path)
     hollows = check_concavity(concavity, urdf.links)
@@ -206,6 +207,16 @@ def urdf_figure(
     visual = visual_of_links(model, ((number, *one) for number, one in enumerate(urdf.visuals)))
     robot = Robot(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual)
     return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples)
+
+
+def _without_world(urdf: UrdfFile) -> tuple[UrdfFile, bool]:
+    """The file without an empty root link on which all the rest floats, as MuJoCo takes it; and whether it had one."""
+    world, first = urdf.links[0], [joint for joint in urdf.joints if joint.parent == urdf.links[0]]
+    filled = {*urdf.inertials, *(one.link for one in urdf.shapes), *(one.shape.link for one in urdf.visuals)}
+    if [joint.kind for joint in first] != ["floating"] or world in filled:
+        return urdf, False
+    links = (first[0].child, *(name for name in urdf.links[1:] if name != first[0].child))
+    return with_values(urdf, links=links, joints=tuple(joint for joint in urdf.joints if joint is not first[0])), True
 
 
 def _described(robot: Robot, path: Path) -> Robot:
