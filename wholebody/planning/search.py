@@ -91,8 +91,8 @@ class Search:
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
             long = not (self._local is self._slides or self._bodily) and most > LONG * straight
-            late = not long or spent > LATER
-            self._until, enough = (self._again, self._local.samples) if late else (self._later(paths), np.inf)
+            long = long and spent <= LATER
+            self._until, enough = (self._later(paths), np.inf) if long else (self._again, self._local.samples)
         ready = sorted([*self._polished(paths), *paths], key=lambda path: length(model, path))
         best = next((path for path in ready if self._proven(path)), None)
         if best is not None:
