@@ -765,7 +765,7 @@ def test_goals_come_in_any_list() -> None:
 
 
 def test_nothing_is_begun_that_the_time_limit_does_not_let_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock that goes on by 10 ms whenever it is looked at is looked at twelve times after the limit, at most."""
+    """A clock that goes on by 10 ms whenever it is looked at is looked at thirteen times after the limit, at most."""
     shown = [0.0]
 
     def now(clock: str) -> float:
@@ -778,7 +778,7 @@ def test_nothing_is_begun_that_the_time_limit_does_not_let_end(monkeypatch: pyte
         began = shown[0]
         found = wb.plan(problem.scene, problem.start, list(problem.goals), constraints=problem.stated, time_limit=limit)
         assert not found.solved
-        assert shown[0] - began <= max(limit, 0.1) + 0.12 + 1e-9  # rounding
+        assert shown[0] - began <= max(limit, 0.1) + 0.13 + 1e-9  # rounding
 
 
 def test_who_is_held_and_stays_has_a_motion_of_no_length(human: wb.Figure) -> None:

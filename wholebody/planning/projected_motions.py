@@ -33,7 +33,7 @@ ITERATIONS = 8  # of a projection, which takes two or three from a step
 class ProjectedMotions(Geodesics):
     """Steps towards a posture that are projected onto what is held."""
 
-    searches: ClassVar[int] = 4
+    searches: ClassVar[int] = 8
     samples: ClassVar[int] = 200
     rounds: ClassVar[int] = 50
     tries: ClassVar[int] = 25

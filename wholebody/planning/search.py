@@ -22,11 +22,11 @@ from wholebody.planning.tracked_motions import LocalPlanner, TrackedMotions
 from wholebody.problem import Problem
 
 SEARCHED = 0.75  # of the time limit: for the first path; the rest is for shortcuts, smoothing and the judgement
-HELD_AGAIN = 0.15  # the same where something is held, as a second search of a body takes as long as the first
+HELD_AGAIN = 0.3  # the same where something is held, as a second search of a body takes as long as the first
 AGAIN = 0.4  # of the time limit: for shorter paths; more = shorter, later
 STEPPED = 2  # samples of trees that look for a shorter path, of which one is stepped towards; more = shorter paths
 LONG = 2.0  # of the straight motion to the nearest end: a path that is longer is worth the time until LATER
-LATER = 0.65  # of the time limit: as AGAIN, for long paths of a figure whose polishing is cheap, as it has no free root
+LATER = 0.65  # of the time limit: as AGAIN, for long paths, but of bodies that hold nothing, whose polishing is dear
 ASIDE = 0.6  # of samples beside what is held: a limb that moves or its tip is elsewhere; more = less else is tried
 LIMBS = 0.7  # of these: joints of the limb are random; of others its tip is displaced, and all else follows
 POLISHED = 0.7  # of the time limit: the shortest paths are drawn tight until then
@@ -65,7 +65,8 @@ class Search:
         enough: float = self._local.samples
         while most == np.inf or (runs < self._local.searches and samples < enough and BUDGET.spent < self._until):
             # other motions are shorter than this share of the best one
-            path, trees = self._path(0.95 * most, np.inf if most == np.inf else enough - samples)
+            within = np.inf if self._held else 0.95 * most
+            path, trees = self._path(within, np.inf if most == np.inf else enough - samples, most == np.inf)
             runs, samples = runs + 1, samples + trees.samples * (runs > 0)
             if path is None:
                 break
@@ -80,6 +81,8 @@ class Search:
                     path = shortcut(model, path, self._local, self._rng, self._local.partial and not self._bodily)
             with self._in_time(path):
                 path = nearer(self._problem, path, self._local, self._sampler)
+            spent = BUDGET.spent
+            path = self._tight(path) if self._held and self._tightens and spent < self._until else path
             paths.append(path)
             # steps along things may be none that are proven, and trees are sought beside these
             if (found := length(model, path)) < most and self._proven(path):
@@ -87,8 +90,9 @@ class Search:
                 if not any(np.array_equal(path[-1], q) for q in self._reached):
                     self._reached.append(path[-1])
             straight = min(self._apart(self._problem.start, q) for q in self._reached)
-            long = not (self._local is self._slides or self._bodily or self._held) and most > LONG * straight
-            self._until, enough = (LATER, np.inf) if long else (self._again, self._local.samples)
+            long = not (self._local is self._slides or self._bodily) and most > LONG * straight
+            long = long and spent <= LATER
+            self._until, enough = (self._later(paths), np.inf) if long else (self._again, self._local.samples)
         ready = sorted([*self._polished(paths), *paths], key=lambda path: length(model, path))
         best = next((path for path in ready if self._proven(path)), None)
         if best is not None:
@@ -104,26 +108,37 @@ class Search:
         waiting = sorted(paths, key=lambda path: length(model, path))
         while waiting and self._tightens and BUDGET.spent < POLISHED:
             path = waiting.pop(0)
-            with self._in_time(path):
-                left = BUDGET.left
-            # a path that there is no time to smooth stops at its corners, and is judged three times as long
-            if left < 0.2:  # s: a body's smoothing takes as long
-                break
-            # most of the remaining time is for smoothing and the last program, which ends late
-            with within_budget(0.2 * left):
-                tight = tighten(model, path, self._local, self._slides)
-            best = tight if length(model, tight) < length(model, path) and self._proven(tight) else path
+            best = self._tight(path)
             if length(model, best) > 0.97 * length(model, path):  # it counts as tight
                 found.append(best)
             else:
                 waiting.insert(0, best)
         return [*found, *waiting]
 
+    def _later(self, paths: list[list[Array]]) -> float:
+        """Share of the time limit until which shorter paths are sought: what is left smooths and judges the best."""
+        with self._in_time(min(paths, key=lambda path: length(self._problem.scene.model, path))):
+            left = BUDGET.left
+        return min(LATER, BUDGET.spent + left / BUDGET.seconds - 0.45)
+
+    def _tight(self, path: list[Array]) -> list[Array]:
+        """A path drawn tight for a while; the path itself where that is no shorter."""
+        model = self._problem.scene.model
+        with self._in_time(path):
+            left = BUDGET.left
+        # a path that there is no time to smooth stops at its corners, and is judged three times as long
+        if left < 0.2:  # s: a body's smoothing takes as long
+            return path
+        # most of the remaining time is for smoothing and the last program, which ends late
+        with within_budget(0.2 * left):
+            tight = tighten(model, path, self._local, self._slides)
+        return tight if length(model, tight) < length(model, path) and self._proven(tight) else path
+
     def _proven(self, path: list[Array]) -> bool:
         """Whether all motions between the postures of a path are free and keep constraints, those by steps too."""
         return all(not BUDGET.over and self._slides.geodesics.follows(*pair) for pair in pairwise(path))
 
-    def _path(self, most: float, samples: float) -> tuple[list[Array] | None, RRTConnect]:
+    def _path(self, most: float, samples: float, first: bool) -> tuple[list[Array] | None, RRTConnect]:
         """A path from the start to an end by new trees, which stay empty where it is straight.
 
         The trees grow towards at most so many samples, through which a path can be shorter than `most`, radians and
@@ -132,13 +147,11 @@ class Search:
         start, model, rounds = self._problem.start, self._problem.scene.model, 0
         self._straight = False
         sliding = self._problem.scene.figure.roots and type(self._local) is Geodesics
-        trees = RRTConnect(
-            self._local, self._slides if sliding else None, model, start, 1 if most == np.inf else STEPPED
-        )
+        trees = RRTConnect(self._local, self._slides if sliding else None, model, start, 1 if first else STEPPED)
         ends = [q for q in self._reached if self._apart(start, q) < most]
         for reached in ends:
             trees.add_end(reached)
-        while rounds < samples and (BUDGET.spent < (SEARCHED if most == np.inf else self._until) or not self._begun):
+        while rounds < samples and (BUDGET.spent < (SEARCHED if first else self._until) or not self._begun):
             self._begun = True
             if rounds % self._local.rounds == 0 or not ends:
                 q, why = next(self._ends, (None, ""))

@@ -46,9 +46,13 @@ def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: Tr
         program = programmed(model, band, slides, damping)
         if program is None:
             break
-        moved, cut = _moved(model, band, program, (local, slides))
-        before, after = length(model, band), length(model, moved)
-        better = before - after
+        before, better = length(model, band), 0.0
+        for _ in range(3):  # a part of displacements that make it longer, as some are cut, costs less than other ones
+            moved, cut = _moved(model, band, program, (local, slides))
+            better = before - length(model, moved)
+            if better > 0.0 or BUDGET.over:
+                break
+            program = with_values(program, away=0.3 * program.away)
         # what comes much shorter of what was foreseen was displaced too far
         damping = max(0.5 * damping, DAMPING) if better > 0.25 * program.foreseen else 4.0 * damping
         band = moved if better > 0.0 else band
