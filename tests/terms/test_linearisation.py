@@ -459,8 +459,9 @@ def test_goals_that_move_are_written_where_nobody_else_reads(problem, more):
 def test_terms_that_few_problems_have_are_told_and_need_their_loops_alone() -> None:
     figure = wb.load("human")
     point = wb.Point("right_palm", (0.4, -0.3, 1.2))
-    for more, seldom in (({}, False), ({"goals": [point, wb.Axis("head", axis=(1.0, 0.0, 0.0), direction=(1.0, 0.0, 0.0))]}, True)):
-        problem = wb.Problem(wb.Scene(figure), **({"goals": [point]} | more))
+    gaze = wb.Axis("head", axis=(1.0, 0.0, 0.0), direction=(1.0, 0.0, 0.0))
+    for goals, seldom in (([point], False), ([point, gaze], True)):
+        problem = wb.Problem(wb.Scene(figure), goals=goals)
         with problem.borrow() as workspace:
             assert problem.lineariser(workspace).plan.seldom is seldom
 

@@ -1,4 +1,4 @@
-"""What numba's compiler does in vain, or again and again, for loops over numbers: a seventh of the time is saved."""
+"""What numba's compiler does in vain, or again and again, for loops over numbers: a seventh of the time."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 @lru_cache(maxsize=1)
 def needed_passes() -> Any:
-    """The compiler without passes for closures, functions to inline, literals, and expressions of whole arrays."""
+    """The compiler without passes for closures, literals and contexts."""
     from numba.core import compiler
 
     idle = {
-        "DumpParforDiagnostics", "FindLiterallyCalls", "InlineClosureLikes", "InlineInlinables", "InlineOverloads",
-        "LiteralPropagationSubPipelinePass", "LiteralUnroll", "MakeFunctionToJitFunction",
-        "NoPythonSupportedFeatureValidation", "NopythonRewrites", "RewriteDynamicRaises", "WithLifting",
+        "DumpParforDiagnostics", "FindLiterallyCalls", "InlineClosureLikes", "LiteralPropagationSubPipelinePass",
+        "LiteralUnroll", "MakeFunctionToJitFunction", "NoPythonSupportedFeatureValidation", "RewriteDynamicRaises",
+        "WithLifting",
     }  # fmt: skip
 
     class Needed(compiler.CompilerBase):  # type: ignore[misc]
