@@ -296,12 +296,12 @@ def _loop_type() -> Any:
                 codegen.create_library = partial(self.code_type, codegen)
                 codegen.unserialize_library = partial(self.code_type.read, codegen)
                 NRTContext.get_meminfos = counted
-                BaseFunction.get_call_type = known_call_type()
+                BaseFunction.get_call_type = known_call_type()  # type: ignore[method-assign]
                 try:
                     return super().compile(sig)
                 finally:
                     codegen.create_library, codegen.unserialize_library, NRTContext.get_meminfos = outer
-                    BaseFunction.get_call_type = looked_up
+                    BaseFunction.get_call_type = looked_up  # type: ignore[method-assign]
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)
