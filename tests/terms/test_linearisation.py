@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -450,3 +454,25 @@ def test_goals_that_move_are_written_where_nobody_else_reads(problem, more):
     assert np.allclose(lineariser.at(q, 0.0).goal_error, kept + moved)
     assert np.array_equal(relaxed.at(q, 0.0).goal_error, kept)
     assert np.array_equal(first.lineariser(first.workspace()).at(q, 0.0).goal_error, kept)
+
+
+def test_terms_that_few_problems_have_are_told_and_need_their_loops_alone() -> None:
+    figure = wb.load("human")
+    point = wb.Point("right_palm", (0.4, -0.3, 1.2))
+    gaze = wb.Axis("head", axis=(1.0, 0.0, 0.0), direction=(1.0, 0.0, 0.0))
+    for goals, seldom in (([point], False), ([point, gaze], True)):
+        problem = wb.Problem(wb.Scene(figure), goals=goals)
+        with problem.borrow() as workspace:
+            assert problem.lineariser(workspace).plan.seldom is seldom
+
+
+def test_a_first_solve_of_a_person_needs_no_loops_of_seldom_terms_and_of_plans(root: Path) -> None:
+    code = """
+import sys
+import wholebody as wb
+problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_palm", (0.4, -0.3, 1.2))])
+assert wb.solve(problem).solved
+print([name for name in sys.modules if name.endswith(("terms.seldom_kernel", "continuous.kept_apart"))])
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["[]"]

@@ -21,8 +21,10 @@ from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, TypeVar
 
+from wholebody.base.compiler_passes import known_call_type, needed_passes
+
 TOGETHER = (
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.plain_chain"),
+    ("wholebody.terms.linearisation", "wholebody.terms.seldom_kernel", "wholebody.methods.qp.plain_chain"),
     (
         "wholebody.methods.qp.active_set",
         "wholebody.methods.qp.step_program",
@@ -32,6 +34,7 @@ TOGETHER = (
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",
+        "wholebody.geometry.continuous.kept_apart",
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.dynamics.impulse_kernel",
@@ -53,7 +56,10 @@ TOGETHER = (
 Each module has a function `compiled_kernel`, which compiles or loads its loops.
 """
 
-BESIDE = {"wholebody.terms.linearisation": "wholebody.terms.kernel"}
+BESIDE = {
+    "wholebody.methods.qp.subproblem": "wholebody.methods.qp.subproblem_kernel",
+    "wholebody.terms.linearisation": "wholebody.terms.kernel",
+}
 """Modules of `TOGETHER` that a first solve needs last, half of all that it compiles, and where their loops are."""
 
 SHARED = "wholebody.geometry.contact_rows"
@@ -83,7 +89,7 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
     folder. If no folder is writable, every process compiles anew. A function that only compiled functions call,
     `inner`, is compiled sooner, and calling it from Python raises a TypeError.
     """
-    loop_type = _inner_type() if inner else _loop_type()
+    loop_type, passes = _inner_type() if inner else _loop_type(), needed_passes()
     _watch()
 
     def decorate(function: F) -> F:
@@ -94,7 +100,7 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
             "no_cpython_wrapper": inner,
             **options,
         }
-        loop: F = loop_type(function, targetoptions=target)
+        loop: F = loop_type(function, targetoptions=target, pipeline_class=passes)
         if inner and function.__name__.startswith("_"):
             return loop  # kept as a part of its callers, which are in the same module
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
@@ -249,6 +255,7 @@ def _loop_type() -> Any:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.registry import CPUDispatcher, cpu_target
     from numba.core.runtime.context import NRTContext
+    from numba.core.types.functions import BaseFunction
     from numba.core.types.misc import unliteral
 
     def counted(nrt: Any, builder: Any, kind: Any, value: Any) -> Any:
@@ -285,13 +292,16 @@ def _loop_type() -> Any:
             with global_compiler_lock:
                 codegen = self.targetctx.codegen()
                 outer = codegen.create_library, codegen.unserialize_library, NRTContext.get_meminfos
+                looked_up = BaseFunction.get_call_type
                 codegen.create_library = partial(self.code_type, codegen)
                 codegen.unserialize_library = partial(self.code_type.read, codegen)
                 NRTContext.get_meminfos = counted
+                BaseFunction.get_call_type = known_call_type()  # type: ignore[method-assign]
                 try:
                     return super().compile(sig)
                 finally:
                     codegen.create_library, codegen.unserialize_library, NRTContext.get_meminfos = outer
+                    BaseFunction.get_call_type = looked_up  # type: ignore[method-assign]
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
             args = tuple(unliteral(kind) for kind in args)

@@ -15,8 +15,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
+from wholebody.geometry.continuous.kept_apart import kept_apart
 from wholebody.geometry.continuous.motion_bounds import largest_approach, pair_kinds
-from wholebody.geometry.continuous.moved_pairs import kept_apart
 from wholebody.methods.control import BUDGET
 from wholebody.planning.contact_values import joined_contacts
 from wholebody.problem import Problem

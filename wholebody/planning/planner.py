@@ -50,6 +50,7 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.methods.qp.plain_chain",
     "wholebody.geometry.proximity",
     "wholebody.geometry.contact_rows",
+    "wholebody.geometry.continuous.kept_apart",
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
     "wholebody.planning.multiplier_kernel",

@@ -1,4 +1,7 @@
-"""A plan's terms at a posture, to first order, as compiled loops: see `plan` and `linearisation`."""
+"""A plan's terms at a posture, to first order, as compiled loops: see `plan` and `linearisation`.
+
+Those of `seldom_kernel` are added afterwards; the first solve of most people and robots need not wait for their loops.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +16,9 @@ from wholebody.geometry.patch_kernel import TableArrays, contact_rows
 from wholebody.geometry.proximity_kernel import gather
 from wholebody.tasks.discomfort import POWER, STEEPNESS
 from wholebody.terms import entries as kinds
-from wholebody.terms.coordinate_kernel import (
-    Table,
-    balls,
-    coordinates,
-    coupled_ranges,
-    elliptic_ranges,
-    hangs,
-    heights,
-    rhythms,
-    root_distances,
-    roots,
-    turns,
-)
+from wholebody.terms.coordinate_kernel import Table, coupled_ranges, elliptic_ranges, rhythms, root_distances
 from wholebody.terms.entries import Integers
-from wholebody.terms.residual_kernel import axis_errors, cones, planes, residuals, twists
+from wholebody.terms.residual_kernel import cones, residuals, twists
 
 Plan: TypeAlias = tuple[Array, Integers, Integers, NDArray[np.int8]]
 """Floats, integers, layout and support of a `TermPlan`."""
@@ -40,21 +31,24 @@ NearArrays: TypeAlias = tuple[Array, Array, Indices, Indices, Array, Array, Arra
 
 
 @compiled(inner=True)
-def _floats(flat: Array, layout: Integers, table: int) -> Array:
+def floats_of(flat: Array, layout: Integers, table: int) -> Array:
+    """A table of floats, a view."""
     start, rows, columns = layout[table, 0], layout[table, 1], layout[table, 2]
     return flat[start : start + rows * columns].reshape((rows, columns))
 
 
 @compiled(inner=True)
-def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
+def integers_of(flat: Integers, layout: Integers, table: int) -> Integers:
+    """A table of integers, a view."""
     start, rows, columns = layout[table, 3], layout[table, 4], layout[table, 5]
     return flat[start : start + rows * columns].reshape((rows, columns))
 
 
 @compiled(inner=True)
-def _table(plan: Plan, table: int) -> Table:
+def table_of(plan: Plan, table: int) -> Table:
+    """The floats and the integers of a table."""
     floats, integers, layout, _ = plan
-    return _floats(floats, layout, table), _integers(integers, layout, table)
+    return floats_of(floats, layout, table), integers_of(integers, layout, table)
 
 
 @compiled(error_model="numpy")
@@ -63,7 +57,7 @@ def linearise(
     clearances: Array, pieces: TableArrays, near: NearArrays, known: int,
     room: tuple[Array, Array, Array, Array, Array, Array],
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Values and Jacobian rows of all terms of a plan, then contacts and their Jacobian rows; bounds and measures.
+    """Values and Jacobian rows of terms of a plan, then contacts and their Jacobian rows; bounds and measures.
 
     Args:
         state: placements of the joints (njoints, 4, 3), see `placement_view`; columns of the joint Jacobian (n, 6), in
@@ -93,15 +87,18 @@ def linearise(
     wrench, value, jacobian, box, measure, squares = room
     floats, integers, layout, _ = plan
     terms = len(value)
-    column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
+    column, bodies = integers_of(integers, layout, kinds.COLUMN), integers_of(integers, layout, kinds.BODY)
     tree = (columns, column, bodies)
     jacobian[:terms] = 0.0
     wrench[:] = 0.0
     _wrench_terms(plan, joints, tree, wrench, value, jacobian)
-    _coordinate_terms(plan, joints, tree, q, value, jacobian)
-    limits, limit_places = _table(plan, kinds.LIMIT)
-    _box(limits, limit_places, _floats(floats, layout, kinds.BOX), q, box)
-    _measures(plan, joints, tree, q, measure, squares)
+    if layout[kinds.COUPLED, 1]:
+        coupled_ranges(*table_of(plan, kinds.COUPLED), q, value, jacobian)
+    if layout[kinds.ELLIPSE, 1]:
+        elliptic_ranges(*table_of(plan, kinds.ELLIPSE), q, value, jacobian)
+    limits, limit_places = table_of(plan, kinds.LIMIT)
+    _box(limits, limit_places, floats_of(floats, layout, kinds.BOX), q, box)
+    _measures(plan, q, measure, squares)
     if known < 0:
         given = (pairs, travelled, bound)
         known, broken = gather(results, index, given, within, clearances[1], (distance, vectors, number, pair))
@@ -118,7 +115,7 @@ def linearise(
     for r in range(gaps):
         gap_clearance[r] = least[gap_contact[r]]
         jacobian[terms + r] = 0.0
-        _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
+        wrench_row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
     return known, gaps, False
 
 
@@ -127,50 +124,24 @@ def _wrench_terms(plan: Plan, joints: Array, tree: Tree, wrench: Array, value: A
     """Terms whose rows are wrenches on one or two bodies."""
     floats, integers, layout, _ = plan
     columns, column, bodies = tree
-    residuals(*_table(plan, kinds.RESIDUAL), joints, wrench, value)
-    if layout[kinds.PLANE, 1]:
-        planes(*_table(plan, kinds.PLANE), joints, wrench, value)
-    if layout[kinds.AXIS, 1]:
-        axis_errors(*_table(plan, kinds.AXIS), joints, wrench, value)
+    residuals(*table_of(plan, kinds.RESIDUAL), joints, wrench, value)
     if layout[kinds.CONE, 1]:
-        cones(*_table(plan, kinds.CONE), _floats(floats, layout, kinds.EDGE), joints, wrench, value)
+        cones(*table_of(plan, kinds.CONE), floats_of(floats, layout, kinds.EDGE), joints, wrench, value)
     if layout[kinds.TWIST, 1]:
-        twists(*_table(plan, kinds.TWIST), joints, wrench, value)
-    wrenched = ((kinds.RESIDUAL, 0), (kinds.PLANE, 1), (kinds.AXIS, 2), (kinds.CONE, 1), (kinds.TWIST, 1))
-    for table, rows in wrenched:
-        entries = _integers(integers, layout, table)
+        twists(*table_of(plan, kinds.TWIST), joints, wrench, value)
+    for table in (kinds.RESIDUAL, kinds.CONE, kinds.TWIST):
+        entries = integers_of(integers, layout, table)
         for e in range(len(entries)):
-            against = entries[e, 2] if table in (kinds.RESIDUAL, kinds.CONE, kinds.TWIST) else 0
-            count = 3 * (entries[e, 3] + entries[e, 4]) if table == kinds.RESIDUAL else rows
+            count = 3 * (entries[e, 3] + entries[e, 4]) if table == kinds.RESIDUAL else 1
             for r in range(entries[e, 0], entries[e, 0] + count):
-                _row(wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
+                wrench_row(wrench[r], entries[e, 1], entries[e, 2], columns, bodies, column, jacobian[r])
 
 
 @compiled(inner=True)
-def _coordinate_terms(plan: Plan, joints: Array, tree: Tree, q: Array, value: Array, jacobian: Array) -> None:
-    """Terms of the centre of mass and of coordinates, which write their Jacobian rows themselves."""
-    floats, _, layout, _ = plan
-    if layout[kinds.MASS_CENTER, 1]:
-        masses = _floats(floats, layout, kinds.BODY)
-        _mass_centers(_table(plan, kinds.MASS_CENTER), masses, joints, tree, value, jacobian)
-    if layout[kinds.COORDINATE, 1]:
-        coordinates(*_table(plan, kinds.COORDINATE), q, value, jacobian)
-    if layout[kinds.TURN, 1]:
-        turns(*_table(plan, kinds.TURN), q, value, jacobian)
-    if layout[kinds.ROOT, 1]:
-        roots(*_table(plan, kinds.ROOT), q, value, jacobian)
-    if layout[kinds.COUPLED, 1]:
-        coupled_ranges(*_table(plan, kinds.COUPLED), q, value, jacobian)
-    if layout[kinds.ELLIPSE, 1]:
-        elliptic_ranges(*_table(plan, kinds.ELLIPSE), q, value, jacobian)
-
-
-@compiled(inner=True)
-def _measures(plan: Plan, joints: Array, tree: Tree, q: Array, measure: Array, squares: Array) -> None:
+def _measures(plan: Plan, q: Array, measure: Array, squares: Array) -> None:
     """Gradient, value and curvature of the measures, and rows of those that are sums of squares."""
-    floats, _, layout, support = plan
-    columns, column, _ = tree
-    constant = _floats(floats, layout, kinds.CURVATURE)
+    floats, _, layout, _ = plan
+    constant = floats_of(floats, layout, kinds.CURVATURE)
     nv = measure.shape[1] - 1
     for v in range(nv):
         measure[0, v] = 0.0
@@ -178,34 +149,26 @@ def _measures(plan: Plan, joints: Array, tree: Tree, q: Array, measure: Array, s
     measure[0, nv] = measure[1, nv] = 0.0
     if len(squares):
         measure[2] = 0.0
-    _distances(*_table(plan, kinds.DISTANCE), q, measure)
-    _discomforts(*_table(plan, kinds.DISCOMFORT), q, measure)
+    _distances(*table_of(plan, kinds.DISTANCE), q, measure)
+    _discomforts(*table_of(plan, kinds.DISCOMFORT), q, measure)
     if layout[kinds.ROOT_DISTANCE, 1]:
-        root_distances(*_table(plan, kinds.ROOT_DISTANCE), q, measure)
+        root_distances(*table_of(plan, kinds.ROOT_DISTANCE), q, measure)
     if layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]:
-        rhythms(_table(plan, kinds.ELEVATION), _table(plan, kinds.LUMBAR), q, measure, squares)
-    first = layout[kinds.ELEVATION, 1] + layout[kinds.LUMBAR, 1]
-    if layout[kinds.BALL, 1]:
-        balls(*_table(plan, kinds.BALL), q, measure, squares, first)
-    if layout[kinds.HANG, 1]:
-        first += 3 * layout[kinds.BALL, 1]
-        hangs(_table(plan, kinds.HANG), joints, (columns, column, support), measure, squares, first)
-    if layout[kinds.HEIGHT, 1]:
-        heights(*_table(plan, kinds.HEIGHT), joints, (columns, column, support), measure)
+        rhythms(table_of(plan, kinds.ELEVATION), table_of(plan, kinds.LUMBAR), q, measure, squares)
 
 
 @compiled(error_model="numpy")
 def wrench_rows(wrench: Array, joint: int, against: int, columns: Array, plan: Plan, rows: Array) -> None:
     """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another."""
     _, integers, layout, _ = plan
-    column, bodies = _integers(integers, layout, kinds.COLUMN), _integers(integers, layout, kinds.BODY)
+    column, bodies = integers_of(integers, layout, kinds.COLUMN), integers_of(integers, layout, kinds.BODY)
     rows[:] = 0.0
     for r in range(len(wrench)):
-        _row(wrench[r], joint, against, columns, bodies, column, rows[r])
+        wrench_row(wrench[r], joint, against, columns, bodies, column, rows[r])
 
 
 @compiled(inner=True)
-def _row(
+def wrench_row(
     wrench: Array, joint: int, against: int, columns: Array, bodies: Integers, column: Integers, row: Array
 ) -> None:
     """Add to a row (nv,) the rates of a wrench on a joint's motion relative to another: of columns between the two."""
@@ -225,62 +188,6 @@ def _row(
             joint = bodies[at, 0]
         else:
             against = bodies[at, 0]
-
-
-@compiled(inner=True)
-def _moments(bodies: Array, joints: Array, parents: Integers) -> Array:
-    """Mass of each subtree, and its mass times its centre in the world (njoints, 4)."""
-    count = len(bodies)
-    moment = np.zeros((count, 4))
-    for j in range(1, count):
-        mass = bodies[j, 0]
-        moment[j, 0] = mass
-        for i in range(3):
-            center = joints[j, 3, i]
-            for k in range(3):
-                center += joints[j, k, i] * bodies[j, 1 + k]
-            moment[j, 1 + i] = mass * center
-    for j in range(count - 1, 0, -1):
-        for i in range(4):
-            moment[parents[j, 0], i] += moment[j, i]
-    return moment
-
-
-@compiled(inner=True, error_model="numpy")
-def _mass_centers(table: Table, bodies: Array, joints: Array, tree: Tree, value: Array, jacobian: Array) -> None:
-    """Rows of the centre of mass of one figure or all: each column needs its subtree's moment."""
-    tables, entries = table
-    columns, column, parents = tree
-    count = len(bodies)
-    moment = _moments(bodies, joints, parents)
-    whole = np.empty(4)
-    begin = 0
-    while begin < len(tables):
-        first, last, end = entries[begin, 1], entries[begin, 2], begin
-        while end < len(tables) and entries[end, 1] == first and entries[end, 2] == last:
-            end += 1
-        for i in range(4):
-            whole[i] = moment[0, i]
-        if first > 1 or last < count:
-            whole[:] = 0.0
-            for j in range(first, last):
-                for i in range(4 if parents[j, 0] == 0 else 0):
-                    whole[i] += moment[j, i]
-        total = whole[0]
-        for e in range(begin, end):
-            inner = tables[e, 0] * whole[1] + tables[e, 1] * whole[2] + tables[e, 2] * whole[3]
-            value[entries[e, 0]] = inner / total - tables[e, 3]
-        for k in range(len(columns)):
-            j = column[k, 1]
-            if j < first or j >= last:
-                continue
-            mass, x, y, z = moment[j, 0] / total, moment[j, 1] / total, moment[j, 2] / total, moment[j, 3] / total
-            forth = mass * columns[k, 0] + columns[k, 4] * z - columns[k, 5] * y
-            left = mass * columns[k, 1] + columns[k, 5] * x - columns[k, 3] * z
-            up = mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x
-            for e in range(begin, end):
-                jacobian[entries[e, 0], column[k, 0]] += tables[e, 0] * forth + tables[e, 1] * left + tables[e, 2] * up
-        begin = end
 
 
 @compiled(inner=True)

@@ -136,6 +136,8 @@ class Lineariser:
         self._kernel = compiled_kernel()
         self._no_squares = np.zeros((0, self.state.model.nv))
         self._plan = self._planned(self.goals) if plan is None else self._again(plan, self.goals)
+        if self._plan.seldom:
+            seldom_kernel()  # not in the middle of a solve
         self._own = self._own_terms()
         self._box, self._measure = np.empty((2, self.state.model.nv)), np.empty((2, self.state.model.nv + 1))
         self._grow(64)
@@ -242,6 +244,9 @@ class Lineariser:
         if broken:
             near.repair_normals(contacts)
             _, gaps, _ = self._kernel.linearise(there, plan[:4], asked, *given, count, written)
+        if plan.seldom:
+            more = self._term_wrench, value, self._jacobian, measure, squares
+            seldom_kernel().add_seldom(state.joints, state.columns, state.q, plan[:4], more)
         if plan.others:
             self._evaluate(plan.others, value, self._jacobian)
         if plan.other_bounds:
@@ -337,6 +342,12 @@ def compiled_kernel(term_kernel: Any) -> None:
     term_kernel.wrench_rows(wrenches, 0, 0, state.columns, plan[:4], rows)
 
 
+@with_loops("wholebody.terms.seldom_kernel")
+def seldom_kernel(kernel: Any) -> None:
+    """The module of those loops that few problems need, compiled or read back with the first that does."""
+    kernel.compiled_kernel()
+
+
 class ConstraintValues:
     """Values of some constraints, and of nothing else, at any state of one model."""
 
@@ -362,6 +373,9 @@ class ConstraintValues:
             (state.joints, state.columns, state.q, NO_PIECES), plan[:4], *NO_CONTACTS,
             (self._wrench, value, self._jacobian, self._box, self._measure, self._no_squares),
         )  # fmt: skip
+        if plan.seldom:
+            more = self._wrench, value, self._jacobian, self._measure, self._no_squares
+            seldom_kernel().add_seldom(state.joints, state.columns, state.q, plan[:4], more)
         for term, evaluate, row, rows in plan.others:
             part = np.atleast_1d(evaluate(state))
             checked_count(term, len(part), rows)

@@ -54,6 +54,7 @@ class TermPlan(NamedTuple):
     goals: tuple[list[Entry] | None, ...]  # entries of each goal; None for one of another class
     constraints: tuple[list[Entry] | None, ...]  # the same of each constraint
     rows: tuple[int, ...]  # of each goal, then of each constraint
+    seldom: bool  # whether there are terms of `seldom_kernel`
 
     @property
     def squares(self) -> int:
@@ -172,9 +173,11 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
         ((int(place), int(joint)), np.zeros(0)) for place, joint in zip(places, state.column_joint, strict=True)
     ]
     floats, integers, layout = _packed(parts)
+    seldom = [kinds.PLANE, kinds.AXIS, kinds.MASS_CENTER, kinds.COORDINATE, kinds.TURN, kinds.ROOT]
+    seldom += [kinds.BALL, kinds.HANG, kinds.HEIGHT]
     return TermPlan(
         floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
-        other_bounds, other_measures, goal_entries, constraint_entries, tuple(counts),
+        other_bounds, other_measures, goal_entries, constraint_entries, tuple(counts), bool(layout[seldom, 1].any()),
     )  # fmt: skip
 
 

@@ -8,7 +8,8 @@ import pytest
 
 import wholebody as wb
 from tests.reference import moved_pairs as reference
-from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved, kept_apart
+from wholebody.geometry.continuous.kept_apart import kept_apart
+from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved
 
 WITHIN = 0.05
 

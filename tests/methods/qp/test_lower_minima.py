@@ -56,3 +56,14 @@ def test_starts_seek_less_effort_where_free_postures_were_led_to_contacts(number
     starts = np.random.default_rng(1).uniform(lower, upper, (20, len(lower)))
     ends = [end.assessment.measure for end in wb.methods.QP().minima(problem, starts) if end.status == "solved"]
     assert wb.solve(problem).assessment.measure < 1.05 * min(ends)
+
+
+def test_where_no_effort_is_spent_no_less_is_sought() -> None:
+    """Who is at the goals at the start was sought a lower minimum than none, in 12 to 14 programs beside one."""
+    figure = wb.load("human")
+    palm = figure.placement(figure.posture("standing"), "right_palm").translation
+    scene = wb.Scene(figure).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=(0.6, 0.0, 1.0))
+    problem = wb.Problem(scene, "standing", goals=[wb.Point("right_palm", palm)], measures=[wb.tasks.Displacement()])
+    found = wb.solve(problem)
+    assert found.assessment.measure == 0.0
+    assert found.iterations <= 1

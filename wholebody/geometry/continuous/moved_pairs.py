@@ -39,29 +39,12 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
     return found
 
 
-def kept_apart(table: PairTable, before: Array, after: Array, known: tuple[Array, Array, Array, Array]) -> bool:
-    """Whether all pairs keep their distances between two placements (n, 4, 3) of the pieces.
-
-    A pair keeps it where its chord is short, or where the same face of one piece has all of the other one in front of
-    it at both ends: between them points are at most so far from the straight way between their two places in the
-    face's frame.
-
-    `known`, metres: (pairs,) how far each may move, and how far it moves at most; (pairs, 2) twice as far as its way
-    leaves the chord, as the first piece sees it and as the second one does; (pairs,) its least distance on the way.
-    """
-    pieces = table.radius, table.axis, table.first_point, table.points, table.first_face, table.faces
-    free: bool = compiled_kernel().kept_apart(before, after, (table.pairs, table.reach, *pieces), known)
-    return free
-
-
 @with_loops("wholebody.geometry.continuous.moved_pairs_kernel")
 def compiled_kernel(moved_pairs_kernel: Any) -> None:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     placements, near = np.zeros((0, 4, 3)), (places, none, 0.0, places, none, 0.0)
     moved_pairs_kernel.far_moved(placements, placements, (pairs, none, none), (places,) * 5, near)
-    pieces = none, np.zeros((0, 3)), places, np.zeros((0, 3)), places, np.zeros((0, 4))
-    moved_pairs_kernel.kept_apart(placements, placements, (pairs, none, *pieces), (none, none, np.zeros((0, 2)), none))
 
 
 def distances(placed: QueryResult, count: int) -> Array:

@@ -284,7 +284,7 @@ class QPMultistart(Search):
                 found.append(local)
         for local in sorted(found, key=lambda each: each.measure)[:count]:
             self.accept(self._descend(local.q, note="for measure"), "from a start for the measures")
-        if not self.settings.restarts:
+        if not self.settings.restarts or self.best.measure <= 0.0:
             return
         begun, rng = 2 * len(self.trace) + SEARCH.cheap, np.random.default_rng([self.settings.seed, count + 1])
         starts = self.lineariser.defined(restarts(*given, rng, self.settings.restarts))
