@@ -222,8 +222,8 @@ def torques(
         both[k] = _pressure(pressed[standing], stand.points[standing])
         outside[k] = dynamics.outside(loads, stand)
     lower, upper = torque_limits(figure, strength)
-    forces = names, force, moment, pressure, both, marks
-    return Torques(figure, clip.dt, torque, strained, *forces, missing, outside, lower, upper)
+    borne = names, force, moment, pressure, both, marks
+    return Torques(figure, clip.dt, torque, strained, *borne, missing, outside, lower, upper)
 
 
 def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
