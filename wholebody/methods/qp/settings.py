@@ -13,8 +13,7 @@ from wholebody.methods.base import BUDGET, Iterations, Restarts, Seed, TimeLimit
 class Settings(Checked):
     """What `QP` is set by."""
 
-    solver: str = "osqp"
-    hot_start: bool = True
+    solver: str = "active_set"
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 150
     budget: Annotated[int, BUDGET] = 1500
