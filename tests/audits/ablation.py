@@ -168,6 +168,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp import closest, feasibility, multistart, sqp
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp import search as descents
+    from wholebody.methods.qp.feasibility import Feasibility
     from wholebody.methods.qp.solvers import base
     from wholebody.methods.qp.solvers.base import WorkingSet
     from wholebody.terms import linearisation
@@ -193,6 +194,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given, **options: iter(())),
         "feasibility first": (search, "feasibility_first", lambda self, start: self.directly(start)),
+        "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
         "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),

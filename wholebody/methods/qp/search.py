@@ -119,7 +119,7 @@ class Search(Multistart[LocalSolution]):
 
     def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
         shared = with_values(self._shared, lineariser=lineariser)
-        return Feasibility(shared, self.settings.tolerance, most, note)
+        return Feasibility(shared, self.settings.tolerance, most, note, figure=self.problem.scene.figure)
 
     def _to_the_place(self) -> bool:
         """Descend to the place of contacts that are met, which does not bend, and from there; whether that is lower."""

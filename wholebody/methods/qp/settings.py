@@ -119,6 +119,7 @@ class FeasibilityNumbers(NamedTuple):
     least_step: float = 1e-3  # rad, m: of the box; smaller = slower to end where steps go to and fro
     damping: float = 0.05  # share of the squared error. Less: dozens of bounds hold a step, and programs are dear.
     within: float = 0.1  # m: pairs nearer than this get rows
+    wide: float = 5.0  # rad: range from which a joint may be taken from one limit to the other
     # share of the violation, or m and rad, that must go in so many programs, else nothing leads nearer
     slow: float = 0.1
     progress: float = 0.1

@@ -59,7 +59,7 @@ def before_contact(
         return
     # The measures count: without contacts, they determine what the terms leave free. Where a point is to come to its
     # side of a thing, limbs first go around that.
-    runs = list[Run]()
+    runs, figure = list[Run](), problem.scene.figure
     for depth in (SEARCH.rest_depth, 0.0) if sides else (ENDLESS,):
         lineariser = shared.lineariser.relaxed(depth)
         lineariser.take(goals, lineariser.clearances, constraints)
@@ -68,7 +68,7 @@ def before_contact(
     def led(q: Array) -> LocalSolution:
         for run in runs:  # to 1 mm or mrad: what is exact there is not where surfaces meet
             given = run, 1e-3, 40, "before contact"
-            local = (Feasibility(*given) if sides else SQP(*given, full_step=True)).run(q)
+            local = (Feasibility(*given, figure=figure) if sides else SQP(*given, full_step=True)).run(q)
             q = local.q
         return local
 
