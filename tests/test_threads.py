@@ -74,7 +74,7 @@ def same(one: wb.Solution, other: wb.Solution) -> bool:
 
 
 METHODS = {  # and how often the problems are solved again
-    "qp/osqp": (wb.methods.QP(budget=20, restarts=1, time_limit=None), 1),
+    "qp": (wb.methods.QP(budget=20, restarts=1, time_limit=None), 1),
     "dls": (wb.methods.DampedLeastSquares(iterations=40, time_limit=None), 3),
     "newton": (wb.methods.Newton(restarts=0, iterations=2, time_limit=None), 0),
     "placo": (wb.methods.Placo(iterations=20, time_limit=None), 0),

@@ -165,7 +165,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     """What a method can do without, by name; empty where nothing is listed."""
     if method != "qp":
         return {}
-    from wholebody.methods import starts
     from wholebody.methods.qp import closest, feasibility, multistart, sqp
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp import search as descents
@@ -202,7 +201,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "multipliers": (sqp, "DESCENT", with_values(sqp.DESCENT, near_met=0.0)),
         "working sets that grow": (base, "CORRECTIONS", with_values(base.CORRECTIONS, near=-1e9)),
         "end of probes that stall": (feasibility, "stalls", lambda history, tolerance: False),
-        "rule of Boender and Rinnooy Kan": (starts, "all_found", lambda *given: False),
         "Latin hypercube": (descents, "throughout", descents.restarts),
         "closest posture: curvature": (
             closest.Closest,

@@ -33,7 +33,7 @@ def test_files_come_back_and_are_programs_of_qpsolvers(recorded: list[Recorded],
     for one in recorded:
         assert same(back[one.name].program, one.program)
         problem = qpsolvers.Problem.load(str(tmp_path / f"{one.name}.npz"))
-        x = make_solver("daqp", hot_start=False).solve(one.program).x
+        x = make_solver("daqp").solve(one.program).x
         r = one.program.rows @ x - one.program.target
         s = np.maximum(one.program.least - one.program.elastic @ x, 0.0)
         z = np.concatenate([x, r, s])

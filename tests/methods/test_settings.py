@@ -20,7 +20,7 @@ REAL = ("tolerance", "damping")
 @pytest.mark.parametrize("method", METHODS)
 def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
     settings = {field.name for field in fields(method) if field.init} - {"solver", "algebra", "inequalities", "holds"}
-    assert settings - {"measures", "hot_start"} <= {*WHOLE, *REAL, "time_limit"}
+    assert settings - {"measures"} <= {*WHOLE, *REAL, "time_limit"}
     for name in settings & {*WHOLE, *REAL}:
         for wrong in (*NO_NUMBER, *((1.5, 2.0) if name in WHOLE else (0.0, 1e9))):
             with pytest.raises(InputError, match=rf"^\w+: {name} is "):

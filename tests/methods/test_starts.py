@@ -1,4 +1,4 @@
-"""Where starts are, and when enough were tried: the rule of Boender and Rinnooy Kan, by its formula and simulated."""
+"""Where starts are, and when ends are alike."""
 
 from __future__ import annotations
 
@@ -11,16 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.starts import Minima, alike, crouched, hooked_hands, restarts, seated, throughout
-
-
-def descents_needed(values, fewest: int = 0) -> int:
-    minima = Minima(fewest)
-    for count, value in enumerate(values, 1):
-        minima.add(value, True)
-        if minima.complete:
-            return count
-    return -1
+from wholebody.methods.starts import alike, crouched, hooked_hands, restarts, seated, throughout
 
 
 @pytest.mark.parametrize(
@@ -34,39 +25,6 @@ def descents_needed(values, fewest: int = 0) -> int:
 )
 def test_three_ends_that_are_the_nearest_and_equally_near_are_alike(ends: list[float], told: bool) -> None:
     assert alike(ends) is told
-
-
-@pytest.mark.parametrize(("known", "needed"), [(1, 7), (2, 16), (3, 29)])
-def test_descents_that_it_takes_to_take_all_minima_for_found(known: int, needed: int) -> None:
-    """From w (n - 1) / (n - w - 2) <= w + 1/2, solved for n by hand."""
-    assert descents_needed(1.0 + k % known for k in range(100)) == needed
-
-
-def test_no_fewer_descents_than_are_asked_for_find_all_minima() -> None:
-    assert descents_needed([1.0] * 100, fewest=12) == 12
-    assert descents_needed((1.0 + k % 2 for k in range(100)), fewest=12) == 16  # the rule asks for more
-
-
-def test_ends_that_did_not_converge_stand_for_minima_not_yet_seen() -> None:
-    minima = Minima()
-    for k in range(40):
-        minima.add(1.0 + k, False)
-    assert not minima.complete
-
-
-def test_the_best_of_several_minima_is_seldom_missed() -> None:
-    """Basins of random sizes: where the rule ends the search, the least one was seen in most of 400 runs."""
-    rng = np.random.default_rng(0)
-    missed = 0
-    for _ in range(400):
-        sizes = rng.dirichlet(np.ones(int(rng.integers(1, 6))))
-        minima, seen = Minima(), set()
-        while not minima.complete and len(seen) < 1000:
-            end = int(rng.choice(len(sizes), p=sizes))
-            seen.add(end)
-            minima.add(1.0 + end, True)
-        missed += 0 not in seen
-    assert missed < 40
 
 
 JOINT = '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><axis xyz="0 0 1"/>{4}</joint>'

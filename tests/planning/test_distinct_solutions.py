@@ -10,6 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.robots import known_arm
+from wholebody.planning.distinct_solutions import all_found
 
 UPPER, FORE, HIGH = 0.5, 0.4, 0.3  # m: lengths of an arm that turns on a post, lifts and bends
 
@@ -287,3 +288,9 @@ def test_why_a_search_ended_does_not_contradict_that_there_may_be_more(planar_ar
     scene.add(wb.Box((0.1, 4.0, 1.0)), name="wall", at=(0.4, 0.0, 0.0))
     none = wb.solutions(wb.Problem(scene, np.array((2.0, 0.3)), goals=[wb.Point("tip", (0.7, 0.3, 0.0))]))
     assert (none.found, none.starts, none.ended) == (0, 40, "the last 40 starts led to none")
+
+
+@pytest.mark.parametrize(("found", "needed"), [(1, 40), (3, 40), (4, 46), (5, 67)])
+def test_descents_that_it_takes_to_take_all_answers_for_found(found: int, needed: int) -> None:
+    """From w (n - 1) / (n - w - 2) <= w + 1/2, by hand n >= 2 w² + 3 w + 2, and from 40."""
+    assert next(n for n in range(100) if all_found(found, n)) == needed

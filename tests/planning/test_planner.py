@@ -28,9 +28,8 @@ from wholebody.planning import Pace, Plan
 from wholebody.planning.contact_values import ContactValues, joined_contacts
 from wholebody.planning.ends import nearer
 from wholebody.planning.local_planner import Geodesics
-from wholebody.planning.multiplier_kernel import projected_gauss_seidel
 from wholebody.planning.projected_motions import ProjectedMotions
-from wholebody.planning.projection_kernel import displace
+from wholebody.planning.projection_kernel import displace, projected_gauss_seidel
 from wholebody.planning.rrt_connect import RRTConnect, Tree
 from wholebody.planning.sampling import Sampler
 from wholebody.planning.smoothing import length, places, refined, shortcut

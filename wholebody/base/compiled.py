@@ -43,7 +43,6 @@ TOGETHER = (
         "wholebody.methods.ccd.guard_kernel",
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
-        "wholebody.planning.multiplier_kernel",
         "wholebody.planning.projection_kernel",
     ),
     (

@@ -1,4 +1,4 @@
-"""Multistart: one loop over starts, the starts, and a rule for when enough were tried."""
+"""Multistart: one loop over starts, and the starts."""
 
 from __future__ import annotations
 
@@ -250,39 +250,6 @@ def throughout(problem: Problem, state: State, start: Array, rng: np.random.Gene
     parts = rng.permuted(np.tile(np.arange(count), (len(lower), 1)), axis=1)
     for share in ((parts + rng.uniform(size=parts.shape)) / count).T:
         yield _moved(problem, state, start, lower + share * (upper - lower))
-
-
-class Minima:
-    """Local minima that descents from random starts found, and whether more are likely.
-
-    With w different minima after n descents, the number of minima to expect is w (n - 1) / (n - w - 2) under a uniform
-    prior; if that is nearer to w than to w + 1, all count as found (C. G. E. Boender, A. H. G. Rinnooy Kan,
-    "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987).
-    """
-
-    def __init__(self, fewest: int = 0) -> None:
-        """Begin with none; before `fewest` descents they do not count as found."""
-        self._fewest = fewest
-        self._values: list[float] = []
-        self._count = 0
-
-    def add(self, value: float, converged: bool) -> None:
-        """Add the end of a descent; the end of one that did not converge is no minimum with which others can agree."""
-        self._count += 1
-        # largest relative difference of values of one minimum; 0.05 merges neighbouring minima
-        if not any(abs(value - known) <= 0.01 * value for known in self._values):
-            self._values.append(value if converged else np.inf)
-
-    @property
-    def complete(self) -> bool:
-        """Whether all minima count as found."""
-        return all_found(len(self._values), self._count, self._fewest)
-
-
-def all_found(found: int, count: int, fewest: int = 0) -> bool:
-    """Whether so many different minima count as all there are, after so many descents; see `Minima`."""
-    enough = count >= max(fewest, found + 3)
-    return enough and found * (count - 1) <= (found + 0.5) * (count - found - 2)
 
 
 def alike(ends: Sequence[float]) -> bool:

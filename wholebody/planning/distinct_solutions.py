@@ -19,7 +19,7 @@ from wholebody.methods.contradictions import contradictions
 from wholebody.methods.control import BUDGET, ctrl_c_ends_all, within_budget
 from wholebody.methods.qp.chain import closed_form_postures
 from wholebody.methods.qp.method import QP
-from wholebody.methods.starts import all_found, throughout
+from wholebody.methods.starts import throughout
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
@@ -36,7 +36,7 @@ class Solutions(Sequence[Solution]):
         found: how many distinct answers there were, those that were not asked for too.
         descents: how many descents ended in a posture that solves the problem.
         starts: how many were made.
-        complete: whether all answers count as found, by the rule of `methods.starts.all_found`: an estimate, no proof;
+        complete: whether all answers count as found, by the rule of `all_found`: an estimate, no proof;
             of an arm of six joints with a closed form, whether all of its branches were descended from. True without a
             start where the problem is proven to have no answer, as beyond an arm's length. Else never where
             neighbours of an answer meet the goals, as those of redundant arms and of people do, and only after 40
@@ -143,8 +143,7 @@ def solutions(
             before, least = least, known.measures[:most]
             same = len(before) == len(least) and np.allclose(before, least, rtol=1e-3)
             unchanged = unchanged + 1 if same else 0
-            # After 12 descents minima at limits, which few starts lead to, were missed.
-            complete = begun == len(branches) if every else all_found(len(known.answers), descents, 40)
+            complete = begun == len(branches) if every else all_found(len(known.answers), descents)
             stopped = told is not None and told(begun, total) is True
             if stopped or complete or (unchanged == UNCHANGED and not every):
                 last = f"the last {unchanged} starts " + ("changed none of these" if len(least) else "led to none")
@@ -154,6 +153,18 @@ def solutions(
     if complete and not _stand_alone(problem, [answer.q for answer in found]):
         complete, ended = False, "neighbours of these meet the goals too"
     return Solutions(tuple(found[:most]), len(found), descents, begun, complete, ended)
+
+
+def all_found(found: int, descents: int) -> bool:
+    """Whether so many different answers count as all there are, after so many descents from random starts.
+
+    With w answers of n descents the number to expect is w (n - 1) / (n - w - 2) under a uniform prior; if that is
+    nearer to w than to w + 1, and n at least 40, all count as found (C. G. E. Boender, A. H. G. Rinnooy Kan, "Bayesian
+    stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987).
+    """
+    # After 12 descents minima at limits, which few starts lead to, were missed.
+    enough = descents >= max(40, found + 3)
+    return enough and found * (descents - 1) <= (found + 0.5) * (descents - found - 2)
 
 
 class _Known:

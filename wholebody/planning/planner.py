@@ -53,7 +53,6 @@ NEEDED = (  # modules whose loops are compiled or read before the clock starts: 
     "wholebody.geometry.continuous.kept_apart",
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",
-    "wholebody.planning.multiplier_kernel",
     "wholebody.planning.projection_kernel",
 )
 

@@ -23,7 +23,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, with_values
 from wholebody.methods.control import BUDGET, within_budget
-from wholebody.planning.multiplier_kernel import projected_gauss_seidel
+from wholebody.planning.projection_kernel import projected_gauss_seidel
 from wholebody.planning.smoothing import banded, length
 from wholebody.planning.tracked_motions import LocalPlanner, Rows, TrackedMotions
 

@@ -59,8 +59,8 @@ def measure(
     for turn, mine in enumerate(_cases(programs)):
         shift = turn % len(solvers)
         for name in [*solvers[shift:], *solvers[:shift]]:
-            solver = make_solver(name, hot_start=False)
-            solver.solve(mine[-1].program)
+            solver = make_solver(name)
+            solver.solve_cold(mine[-1].program)
             rows += [_row(one, name, solver) for one in mine]
         if mine[0].set != done:
             done = mine[0].set
@@ -77,7 +77,7 @@ def _row(one: Recorded, name: str, solver: QPSolver) -> Row:
     program = one.program
     gc.disable()
     worked, clock = time.thread_time_ns(), time.perf_counter_ns()
-    answer = solver.solve(program)
+    answer = solver.solve_cold(program)
     wall, cpu = time.perf_counter_ns() - clock, time.thread_time_ns() - worked
     gc.enable()
     own = solver.uncorrected

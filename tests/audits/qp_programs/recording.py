@@ -48,7 +48,7 @@ class Recorder(QPSolver):
 
     def __init__(self) -> None:
         """Begin with no programs."""
-        super().__init__(hot_start=False)
+        super().__init__()
         self.programs: list[QuadraticProgram] = []
         self._solver = make_solver("active_set")
 

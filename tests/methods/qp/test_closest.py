@@ -28,7 +28,7 @@ def standing():
 def closest(problem, workspace, control, depth, enough, most):
     lineariser = problem.lineariser(workspace)
     lineariser = lineariser.relaxed(depth) if depth else lineariser
-    run = Run(Subproblem(problem, workspace.state), lineariser, make_solver("osqp"), [], control)
+    run = Run(Subproblem(problem, workspace.state), lineariser, make_solver("active_set"), [], control)
     return Closest(run, enough, most, problem=problem, contacts=not depth)
 
 

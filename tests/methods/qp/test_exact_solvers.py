@@ -59,12 +59,12 @@ def programs(draw):
 @settings(max_examples=20, deadline=None)
 @given(program=programs())
 def test_every_solver_is_exact(name, program):
-    solver = make_solver(name, hot_start=False)
+    solver = make_solver(name)
     once, again = solver.solve(program), solver.solve(program)
     assert once.exact
     assert once.x == pytest.approx(by_least_squares(program), abs=TOLERANCE)
     assert once.x == pytest.approx(again.x, abs=1e-9), "from its own last answer"
-    fresh = make_solver(name, hot_start=False).solve(program)
+    fresh = make_solver(name).solve(program)
     assert np.array_equal(fresh.x, once.x)
     assert (fresh.by, fresh.iterations) == (once.by, once.iterations)
 
@@ -90,7 +90,7 @@ def test_solvers_of_qpsolvers_close_programs_with_heavy_rows(name, random_progra
     rng, closed, off = np.random.default_rng(2), 0, []
     for _ in range(100):
         program = with_values(random_program(rng), weight=np.array([1.0, 1e10, 1e4, 1e10]))
-        solver = make_solver(name, hot_start=False)
+        solver = make_solver(name)
         answer = solver.solve(program)
         closed += answer.by == name
         off.append(np.abs(solver.uncorrected - answer.x).max())

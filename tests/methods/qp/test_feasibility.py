@@ -61,7 +61,7 @@ def test_whole_steps_stay_in_their_box(planar_arm):
         wb.Scene(planar_arm((0.5, 0.4))), start=np.array([0.1, 0.4]), goals=[wb.Point("tip", (-0.5, 0.3, 0.0))]
     )
     workspace = problem.workspace()
-    parts = Subproblem(problem, workspace.state), problem.lineariser(workspace), make_solver("osqp")
+    parts = Subproblem(problem, workspace.state), problem.lineariser(workspace), make_solver("active_set")
     run = Run(*parts, [], Control(np.inf))
     local = Feasibility(run, 1e-6, 100, figure=problem.scene.figure).run(problem.start)
     assert local.violation.worst <= 1e-6

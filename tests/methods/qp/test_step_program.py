@@ -51,7 +51,7 @@ class Plain:
 
     def __init__(self, problem: wb.Problem) -> None:
         self.subproblem = Subproblem(problem, State(problem.scene.model))
-        self.working_set = WorkingSet(make_solver("osqp"))
+        self.working_set = WorkingSet(make_solver("active_set"))
         self.before: tuple[np.ndarray, np.ndarray, float] | None = None
         self.damped = self.foresaw = 0
         self.problem, self.bend, self.curving = problem, 0.0, False
@@ -125,7 +125,7 @@ def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
     """Sixty steps, some from elsewhere than where the last ended."""
     problem = wb.Problem(scene, clearance=0.01, **PROBLEMS[name])
     workspace, plain = problem.workspace(), Plain(problem)
-    compiled = StepProgram(problem, workspace, WorkingSet(make_solver("osqp")), DT)
+    compiled = StepProgram(problem, workspace, WorkingSet(make_solver("active_set")), DT)
     lineariser, rng, q = problem.lineariser(workspace, DT), np.random.default_rng(0), problem.start
     for number in range(60):
         if number % 20 == 19:
@@ -187,7 +187,7 @@ def test_a_program_that_the_solver_closes_says_what_room_it_leaves(scene: wb.Sce
     """Without a hot start the room was unknown, and every step along something was looked at again."""
     problem = wb.Problem(scene, clearance=0.01, **PROBLEMS["into a block"])
     workspace = problem.workspace()
-    step = StepProgram(problem, workspace, WorkingSet(make_solver("osqp", hot_start=False)), DT)
+    step = StepProgram(problem, workspace, WorkingSet(make_solver("osqp")), DT)
     at = problem.lineariser(workspace, DT).packed(problem.start, 0.06)
     answer = step.solve(at, measures=True)
     after = step.program.elastic @ answer.x - step.rows.elastic_violation

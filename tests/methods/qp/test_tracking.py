@@ -185,7 +185,7 @@ SLIDER = """<robot name="slider">
 </robot>"""
 
 
-@pytest.mark.parametrize("method", [wb.methods.QP(), wb.methods.QP(hot_start=False)])
+@pytest.mark.parametrize("method", [wb.methods.QP(), wb.methods.QP(solver="osqp")])
 def test_a_joint_does_not_brake_where_it_has_to_leave_something(method: wb.methods.QP, tmp_path: Path) -> None:
     """Five millimetres before its limit, and four inside of a wall behind it: one step leads out."""
     path = tmp_path / "slider.urdf"

@@ -1,4 +1,4 @@
-"""What `solver` and `hot_start` mean: which solver is asked for which program, and what the answer tells of it."""
+"""What `solver` means: which solver is asked for which program, and what the answer tells of it."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def asked(monkeypatch):
     answers = []
     make = registry.make_solver
 
-    def watched(name, hot_start=True):
-        solver = make(name, hot_start)
+    def watched(name):
+        solver = make(name)
         inner = solver.solve_cold
 
         def solve_cold(program):
@@ -61,8 +61,8 @@ def test_as_it_comes_no_solver_is_asked(over_a_table, asked):
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, asked, name):
-    solution = wb.methods.QP(solver=name, hot_start=False).solve(over_a_table)
+def test_every_program_is_the_named_solvers(over_a_table, asked, name):
+    solution = wb.methods.QP(solver=name).solve(over_a_table)
     assert solution.solved
     assert solution.method == f"qp/{name}"
     assert set(solution.programs) <= {name, "semismooth newton"}
@@ -70,29 +70,19 @@ def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, as
     assert all(answer.iterations > 0 for answer in asked), "the solver's own iterations"
 
 
-@pytest.mark.parametrize(("solver", "hot_start"), [("osqp", True), ("active_set", False)])
-def test_counts_add_up_to_the_programs(over_a_table, solver, hot_start):
+@pytest.mark.parametrize("solver", ["osqp", "active_set"])
+def test_counts_add_up_to_the_programs(over_a_table, solver):
     for measures in (True, False):
-        solution = wb.methods.QP(solver=solver, hot_start=hot_start, measures=measures).solve(over_a_table)
+        solution = wb.methods.QP(solver=solver, measures=measures).solve(over_a_table)
         without = sum(entry.note == "seed" for entry in solution.trace)
         assert sum(solution.programs.values()) + without == solution.iterations
-
-
-def test_active_sets_throughout(over_a_table):
-    method = wb.methods.QP(solver="active_set")
-    solution = method.solve(over_a_table)
-    assert solution.method == "qp/active_set"
-    assert max(solution.programs, key=solution.programs.__getitem__) == "active set"
-    assert set(solution.programs) <= {"active set", "osqp", "semismooth newton"}
 
 
 def test_other_methods_have_no_programs(over_a_table):
     assert wb.methods.Newton().solve(over_a_table).programs == {}
 
 
-@pytest.mark.parametrize(
-    "method", [wb.methods.QP(), wb.methods.QP(hot_start=False), wb.methods.QP(solver="active_set")]
-)
+@pytest.mark.parametrize("method", [wb.methods.QP(), wb.methods.QP(solver="osqp")])
 def test_a_tracker_tells_of_every_step(over_a_table, method):
     tracker, q = method.tracker(over_a_table, 0.01), over_a_table.start
     steps = []
@@ -102,41 +92,30 @@ def test_a_tracker_tells_of_every_step(over_a_table, method):
     assert all(sum(step.programs.values()) >= 1 for step in steps)
     if method.name == "qp":
         assert all(list(step.programs) == ["active set"] for step in steps)
-    elif method.name == "qp/osqp":
-        assert all(list(step.programs) == ["osqp"] and step.iterations > 0 for step in steps)
     else:
-        assert all("osqp" not in step.programs for step in steps)
+        assert all(list(step.programs) == ["osqp"] and step.iterations > 0 for step in steps)
 
 
 @pytest.mark.parametrize("name", solver_names())
 def test_every_way_comes_to_the_same_posture(over_a_table, name):
     expected = wb.methods.QP(tolerance=1e-7).solve(over_a_table).q
-    for hot_start in (True, False):
-        q = wb.methods.QP(solver=name, hot_start=hot_start, tolerance=1e-7).solve(over_a_table).q
-        assert q == pytest.approx(expected, abs=1e-4)
+    assert wb.methods.QP(solver=name, tolerance=1e-7).solve(over_a_table).q == pytest.approx(expected, abs=1e-4)
 
 
 @pytest.mark.parametrize(
-    ("settings", "name"),
-    [
-        ({}, "qp"),
-        ({"hot_start": False}, "qp/osqp"),
-        ({"solver": "active_set"}, "qp/active_set"),
-        ({"solver": "daqp"}, "qp/daqp+hot_start"),
-        ({"solver": "daqp", "hot_start": False}, "qp/daqp"),
-    ],
+    ("settings", "name"), [({}, "qp"), ({"solver": "active_set"}, "qp"), ({"solver": "daqp"}, "qp/daqp")]
 )
 def test_the_name_says_what_runs(settings, name):
     assert wb.methods.QP(**settings).name == name
 
 
-def test_with_a_hot_start_the_solver_is_asked_for_what_nothing_else_closes(random_program, monkeypatch):
+def test_with_active_sets_osqp_is_asked_for_what_nothing_else_closes(random_program, monkeypatch):
     """Semismooth Newton steps are several times as fast as the setting up of a solver."""
     program = random_program(np.random.default_rng(0))
-    assert make_solver("daqp").solve(program).by == "semismooth newton"
+    assert make_solver("active_set").solve(program).by == "semismooth newton"
     monkeypatch.setattr(base, "last_resort", lambda *given: with_values(last_resort(*given), exact=False))
+    assert make_solver("active_set").solve(program).by == "osqp"
     assert make_solver("daqp").solve(program).by == "daqp"
-    assert make_solver("daqp", hot_start=False).solve(program).by == "daqp"
 
 
 def test_programs_are_counted_until_they_are_asked_for():

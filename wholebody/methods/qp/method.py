@@ -33,11 +33,9 @@ class QP(Settings, Descends):
     serves any number of problems and threads at the same time.
 
     Attributes:
-        solver: "osqp", "active_set" (our own), "daqp" or any name that qpsolvers lists on this machine; see `wholebody
-            doctor`.
-        hot_start: whether programs begin with the active set of the one before, corrected, then semismooth Newton
-            steps, and the solver is asked only where these fail. Otherwise every program is the solver's. The answers
-            are the same to rounding; `Solution.programs` says how many programs each closed.
+        solver: "active_set", our own, with which programs begin with the active set of the one before; or "osqp",
+            "daqp" or any name that qpsolvers lists on this machine (see `wholebody doctor`), to which every program
+            is given. The answers are the same to rounding; `Solution.programs` says what closed how many programs.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent; one that ends there while the measures decrease goes on, within the
             budget.
@@ -75,13 +73,8 @@ class QP(Settings, Descends):
 
     @property
     def name(self) -> str:
-        """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program.
-
-        "qp/active_set" and "+hot_start" begin with the last active set, and ask their solver where nothing else ends.
-        """
-        if self.hot_start:
-            return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")
-        return f"qp/{self.solver}" if self.solver != "active_set" else "qp/active_set, each anew"
+        """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program."""
+        return "qp" if self.solver == "active_set" else f"qp/{self.solver}"
 
     def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """See `Descends._descend`."""
@@ -142,7 +135,7 @@ class QP(Settings, Descends):
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""
-        return make_solver(self.solver, self.hot_start)
+        return make_solver(self.solver)
 
     def tracker(self, problem: Problem, dt: float) -> QPTracker:
         """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.

@@ -21,17 +21,7 @@ from wholebody.methods.qp.settings import SEARCH, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
-from wholebody.methods.starts import (
-    Attempt,
-    Minima,
-    alike,
-    arms_ahead,
-    crouched,
-    hooked_hands,
-    least_effort,
-    restarts,
-    seated,
-)
+from wholebody.methods.starts import Attempt, alike, arms_ahead, crouched, hooked_hands, least_effort, restarts, seated
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 
@@ -46,7 +36,6 @@ class QPMultistart(Search):
     ) -> None:
         super().__init__(problem, workspace, solver, settings, control)
         self._least = 0.0  # lower bound of the goals' residual, metres
-        self._minima, self._relaxed_minima = Minima(), Minima()  # ends of relaxed probes, with true clearances and not
         self._in_contact, self._seats = list[float](), list[Array]()  # violations from before contact; (nq,) nearer
         self._touches = any(hasattr(term, "touches") for term in (*problem.goals, *problem.constraints))  # contacts
         self._ahead, self._through_measure = self._from_ahead(), 0.0  # starts; of what meets the goals through things
@@ -76,9 +65,8 @@ class QPMultistart(Search):
         return with_values(self.best, converged=settled and not self.control.reason)
 
     def enough(self) -> bool:
-        """Whether the programs are spent, all minima found, or the best is known to be the closest to the goals."""
-        found = self._minima.complete or self._relaxed_minima.complete or alike(self._in_contact)
-        return found or super().enough() or self._proven()
+        """Whether the programs are spent, or the best is as near to the goals as others, or known to be the closest."""
+        return alike(self._in_contact) or super().enough() or self._proven()
 
     def _attempts(self, begin: tuple[Array, ...]) -> Iterator[Attempt[LocalSolution]]:
         """The attempts in their order; each is decided on when those before it failed."""
@@ -129,7 +117,6 @@ class QPMultistart(Search):
         yield Attempt(self._before_contact(grips=True), self._gripping, "from before a grip")
         yield Attempt(self._before_contact(), self._into_contact, "from before contact")
         yield Attempt([start], self._closing, "by feasibility first")
-        self._minima, self._relaxed_minima = Minima(), Minima()  # hands are no random starts
         self.out_of_reach = self._seems_out_of_reach(self.best.q)
         if self.out_of_reach or self._proven():
             return
@@ -148,10 +135,8 @@ class QPMultistart(Search):
 
     def _from_elsewhere(self, count: int) -> Iterator[Attempt[LocalSolution]]:
         """Those from other starts, of which there are `count`."""
-        if few := self._few():
-            self._minima, self._relaxed_minima = Minima(SEARCH.fewest_descents), Minima(SEARCH.fewest_descents)
         starts = self._seeded(count, self._seats[0] if self._seats else self._start)
-        aimed = self.problem.goals and not (few or self._least or self.out_of_reach or self._seats)
+        aimed = self.problem.goals and not (self._few() or self._least or self.out_of_reach or self._seats)
         beside = self._beside(min(count, SEARCH.beside) if aimed else 0)
         for _ in range(count):  # in turn: one from beside takes the programs of two others
             yield Attempt(islice(beside, 1), self._free, "from beside the goals")
@@ -216,10 +201,7 @@ class QPMultistart(Search):
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe through things, and a descent from where it reaches the goals; None where out of reach."""
         relaxed = self._probe(start, SEARCH.relaxation_depth)
-        if not self.solves(relaxed, SEARCH.reached):
-            self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
-            return None
-        return self._free(relaxed.q, start)
+        return self._free(relaxed.q, start) if self.solves(relaxed, SEARCH.reached) else None
 
     def _free(self, start: Array, other: Array | None = None) -> LocalSolution:
         """A probe with the true clearances, and a descent from where it reaches the goals; `other` is (nq,)."""
@@ -230,8 +212,6 @@ class QPMultistart(Search):
         if other is not None and not held(probe, tolerance) and not held(self.best, tolerance):
             probe = self._probe(other, 0.0)  # nothing leads out from there; to be outside comes before the goals
         if probe.violation.worst > tolerance:
-            if other is not None:  # ends from beside the goals are not of random starts
-                self._minima.add(probe.violation.total, probe.converged)
             return probe
         return self._descend(probe.q, "restart", most=max(self._left, 1))
 
@@ -361,7 +341,7 @@ class QPMultistart(Search):
         tolerance, near = self.settings.tolerance, self._near
         if near is not None and (self.out_of_reach or self._least):  # else other starts were tried
             self._missed = SEARCH.agree * near.violation.left
-            self._minima, self._relaxed_minima, self._in_contact = Minima(), Minima(), []
+            self._in_contact = []
             self.search(self._from_elsewhere(self.settings.restarts))
             self.accept(self._ran(self._closest(), self.best.q))
         if not held(self.best, tolerance) and not self.control.over:

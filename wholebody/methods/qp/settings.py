@@ -13,8 +13,7 @@ from wholebody.methods.base import BUDGET, Iterations, Restarts, Seed, TimeLimit
 class Settings(Checked):
     """What `QP` is set by."""
 
-    solver: str = "osqp"
-    hot_start: bool = True
+    solver: str = "active_set"
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 150
     budget: Annotated[int, BUDGET] = 1500
@@ -168,7 +167,6 @@ class SearchNumbers(NamedTuple):
     few: int = 12
     agreeing_few: int = 8  # the same with so few
     reach_trials_few: int = 16  # most descents with so few
-    fewest_descents: int = 12  # ends with so few before minima count as all. Fewer: a second configuration is unseen.
     agree: float = 1.1  # times the least violation up to which they count as equally near
     coming_near: int = 40  # most programs from there to the nearest posture among things
     inside_probes: int = 5  # seeded starts for goals inside of things, which only look for the nearest posture

@@ -35,7 +35,7 @@ NEWTONS: dict[str, dict[str, Any]] = {
 
 def qp_adapter(solver: str = "") -> Adapter:
     """The QP method as it comes, or with every program by a solver."""
-    settings = {"solver": solver, "hot_start": False} if solver else {}
+    settings = {"solver": solver} if solver else {}
     exact = (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
     return Adapter(
         name=f"qp/{solver}" if solver else "qp",

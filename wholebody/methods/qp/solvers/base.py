@@ -28,10 +28,10 @@ class QPSolver(ABC):
     """
 
     name: str
+    hot_start: bool = False
     uncorrected: Array | None = None
 
-    def __init__(self, hot_start: bool = True) -> None:
-        self.hot_start = hot_start
+    def __init__(self) -> None:
         self._programs: dict[str, int] = {}
 
     def solve(self, program: QuadraticProgram) -> QPSolution:

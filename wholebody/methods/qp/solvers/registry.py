@@ -33,21 +33,19 @@ def solver_names() -> tuple[str, ...]:
     return ("osqp", "active_set", *sorted(set(available_solvers) - {"osqp"}))
 
 
-def make_solver(name: str, hot_start: bool = True) -> QPSolver:
+def make_solver(name: str) -> QPSolver:
     """A QP solver by name, for the programs of one run; all but "active_set" are those of qpsolvers."""
     compiled_kernel()  # not in the middle of a solve
     if not isinstance(name, str):
         raise InputError(f"solver is {shown(name)}; give the name of a QP solver, such as 'osqp'")
     if name == "active_set":
-        return ActiveSetSolver(hot_start)
-    if name == "osqp":  # qpsolvers takes half a second to import, and OSQP is hardly ever asked
-        return QpsolversSolver(name, hot_start)
+        return ActiveSetSolver()
     if name not in solver_names() and name in PACKAGES:
         package = PACKAGES[name]
         raise MissingPackageError(f"the QP solver {name} is not installed; install it with: pip install {package}")
     if name not in solver_names():
         raise UnknownNameError("QP solver", name, solver_names())
-    return QpsolversSolver(name, hot_start)
+    return QpsolversSolver(name)
 
 
 class QpsolversSolver(QPSolver):
@@ -56,9 +54,9 @@ class QpsolversSolver(QPSolver):
     The active set that its multipliers tell is corrected, so the answers are exact.
     """
 
-    def __init__(self, name: str, hot_start: bool = True) -> None:
+    def __init__(self, name: str) -> None:
         """Take a name that `qpsolvers.available_solvers` lists."""
-        super().__init__(hot_start)
+        super().__init__()
         self.name = name
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
@@ -101,6 +99,7 @@ class ActiveSetSolver(QPSolver):
     """The primal-dual active set method throughout; OSQP where the sets do not settle."""
 
     name = "active_set"
+    hot_start = True
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
