@@ -382,9 +382,18 @@ def test_a_file_that_floats_on_an_empty_link_has_one_root(root, tmp_path):
     """As the maker's H1 does, for MuJoCo: it went about on two free joints, one on the other."""
     text = """<robot name="r"><link name="world"/><link name="pelvis"><inertial><mass value="1"/>
     <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link><link name="leg"/>
-    <joint name="floating_base" type="floating"><parent link="world"/><child link="pelvis"/></joint>
+    <joint name="floating_base" type="floating"><origin xyz="0.5 0 1" rpy="0 0 0.3"/><parent link="world"/>
+    <child link="pelvis"/></joint>
     <joint name="hip" type="continuous"><parent link="pelvis"/><child link="leg"/><axis xyz="0 1 0"/></joint></robot>"""
     figure = load(write(tmp_path, text), **({} if root is None else {"root": root}))
     assert figure.joints == ("hip",)
     assert figure.root == (root or "free")
     assert figure.model.nv == (1 if root == "fixed" else 7)
+    srdf = tmp_path / "robot.srdf"
+    srdf.write_text("""<robot name="r"><group name="all"><joint name="hip"/></group>
+    <group_state name="home" group="all"><joint name="hip" value="0.3"/></group_state></robot>""")
+    described = load(tmp_path / "robot.urdf", srdf=srdf, **({} if root is None else {"root": root}))
+    for one, posture in ((figure, "neutral"), (described, "home")):  # they were at the world's origin
+        placed = one.placement(one.posture(posture), "pelvis")
+        np.testing.assert_allclose(placed.translation, (0.5, 0.0, 1.0), atol=1e-12)
+        np.testing.assert_allclose(pin.rpy.matrixToRpy(placed.rotation), (0.0, 0.0, 0.3), atol=1e-12)

@@ -192,10 +192,10 @@ def urdf_figure(
         raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
     folders = [package_dirs] if isinstance(package_dirs, (str, PathLike)) else package_dirs
     urdf = read_urdf(Path(path), [Path(folder) for folder in folders])
-    urdf, floats = _without_world(urdf)
+    urdf, place = _without_world(urdf, root)
     extension = urdf.extension
     if root is None:
-        root = "free" if floats or (extension is not None and extension.get("root") == "free") else "fixed"
+        root = "free" if place is not None or (extension is not None and extension.get("root") == "free") else "fixed"
     model, remarks = urdf_model(urdf, root)
     check_size(model, urdf.path)
     hollows = check_concavity(concavity, urdf.links)
@@ -205,22 +205,29 @@ def urdf_figure(
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
     visual = visual_of_links(model, ((number, *one) for number, one in enumerate(urdf.visuals)))
-    robot = Robot(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual)
+    robot = Robot(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual, place=place)
     return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples)
 
 
-def _without_world(urdf: UrdfFile) -> tuple[UrdfFile, bool]:
-    """The file without an empty root link on which all the rest floats, as MuJoCo takes it; and whether it had one."""
+def _without_world(urdf: UrdfFile, root: str | None) -> tuple[UrdfFile, pin.SE3 | None]:
+    """The file without an empty root link on which all the rest floats, as MuJoCo takes it; and where it floats.
+
+    With a fixed root the rest is fixed there.
+    """
     world, first = urdf.links[0], [joint for joint in urdf.joints if joint.parent == urdf.links[0]]
     filled = {*urdf.inertials, *(one.link for one in urdf.shapes), *(one.shape.link for one in urdf.visuals)}
     if [joint.kind for joint in first] != ["floating"] or world in filled:
-        return urdf, False
+        return urdf, None
+    if root == "fixed":
+        held = (with_values(joint, kind="fixed") if joint is first[0] else joint for joint in urdf.joints)
+        return with_values(urdf, joints=tuple(held)), None
     links = (first[0].child, *(name for name in urdf.links[1:] if name != first[0].child))
-    return with_values(urdf, links=links, joints=tuple(joint for joint in urdf.joints if joint is not first[0])), True
+    joints = tuple(joint for joint in urdf.joints if joint is not first[0])
+    return with_values(urdf, links=links, joints=joints), first[0].origin
 
 
 def _described(robot: Robot, path: Path) -> Robot:
-    known = read_srdf(path, robot.model, robot.links)
+    known = read_srdf(path, robot.model, robot.links, robot.place)
     owners = [robot.model.frames[piece.parentFrame].name for piece in robot.geometry.geometryObjects]
     return with_values(
         robot,

@@ -34,8 +34,8 @@ class Srdf(NamedTuple):
     notes: tuple[str, ...]  # sentences on lines that name what the URDF does not have
 
 
-def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
-    """Read the SRDF of a URDF that has a model and links."""
+def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...], place: pin.SE3 | None = None) -> Srdf:
+    """Read the SRDF of a URDF that has a model and links; a free root is at a place where a state has none."""
     robot = read_robot(path, "SRDF")
     reader = _Reader(path, robot, model, links)
     read = READ | {"virtual_joint"} if reader.free else READ
@@ -43,7 +43,7 @@ def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
     if unknown:
         reader.notes.append(f"SRDF: {', '.join(unknown)} is not kept")
     groups = {name: reader.joints(group, (name,)) for name, group in reader.groups.items()}
-    return Srdf(groups, reader.postures(), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
+    return Srdf(groups, reader.postures(place), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
 
 
 class _Reader:
@@ -89,23 +89,25 @@ class _Reader:
                 self.notes.append(f"SRDF: group {shown(inside[-1])} names {shown(name)}, which is no other group")
         return tuple(sorted(found, key=self._movable.__getitem__))
 
-    def postures(self) -> dict[str, Array]:
+    def postures(self, place: pin.SE3 | None) -> dict[str, Array]:
         """Named states as postures; joints that a state does not name are at zero, or at the limit nearest to it."""
         elements = self._robot.findall("group_state")
         names = [str(state.get("name")) for state in elements]
         found: dict[str, Array] = {}
         for state, name in zip(elements, names, strict=True):
             q = zero_within_limits(self._model)
+            if place is not None:
+                q[:7] = pin.SE3ToXYZQUAT(place)
             for joint in state.findall("joint"):
                 known = str(joint.get("name"))
-                place = f"{self._path}: state {shown(name)}: joint {shown(known)}"
+                where = f"{self._path}: state {shown(name)}: joint {shown(known)}"
                 if known in self._roots:
-                    q[:7] = _free_placement(joint, place)
+                    q[:7] = _free_placement(joint, where)
                     continue
                 if known not in self._movable:
                     self.notes.append(f"SRDF: state {shown(name)} names the joint {shown(known)}, which does not move")
                     continue
-                (value,) = numbers(joint, "value", place, 1)
+                (value,) = numbers(joint, "value", where, 1)
                 made = self._model.joints[self._movable[known]]
                 if made.nq == 1 and not self._within(made.idx_q, value):
                     self.notes.append(f"SRDF: state {shown(name)} puts the joint {shown(known)} beyond its limits")
