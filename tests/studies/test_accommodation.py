@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.methods import QP
 from wholebody.studies.accommodation import Accommodation
 
 
@@ -207,3 +208,14 @@ def test_boundary_manikins_are_people() -> None:
     found = wb.boundary(0.9, ["stature", "mass"], "female")
     assert len(found) == 1 + 4 + 4
     assert all(wb.load("human", **one).model.nv == 55 for one in list(found.values())[::4])
+
+
+@pytest.mark.parametrize("name", ["male 5", "male 7", "female 9", "female 23"])
+def test_who_fits_only_beside_a_desk_is_found_from_the_task_s_own_start(name: str) -> None:
+    # Thighs are not level below a top 185 mm over the seat; turned from it at the seat's edge a hand reaches over it.
+    scene = wb.Scene(wb.load("human", **wb.people(25, seed=4)[name])).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.45, 0.45, 0.04)), name="seat", at=(0.0, 0.0, 0.43))
+    scene.add(wb.Box((0.8, 1.2, 0.03)), name="desk", at=(0.62, 0.0, 0.65))
+    goals = [wb.Sit("seat"), wb.Point("right_index_tip", (0.5, -0.2, 0.70))]
+    problem = wb.Problem(scene, "sitting", goals=goals, constraints=[wb.Stand("floor", balance=False)])
+    assert wb.solve(problem, method=QP(measures=False)).solved

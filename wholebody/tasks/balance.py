@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, cross
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Names, Range
@@ -72,10 +73,10 @@ def standing_corners(scene: Scene, q: Array, feet: Sequence[str]) -> tuple[Array
     legs = _legs(scene) if raised.any() else set()
     for foot in np.flatnonzero(raised).tolist():
         if legs and joints[foot] not in legs and not _touches(scene, q, joints[foot]):
-            raise InputError(
+            checks.warn(
                 f"Balance: {feet[foot]!r} is {least[foot] - min(heights):.2f} m above the lowest joint at the "
-                "start and touches nothing, so it bears nothing; name what stands, such as "
-                "feet=['left_foot', 'right_foot'], or start where it bears"
+                "start and touches nothing: it is counted as bearing; unless a term brings it to what bears it, name "
+                "what stands, such as feet=['left_foot', 'right_foot']"
             )
     low = height <= least[soles.foot] + STANDING_HEIGHT
     return points[low], soles.joints[low]

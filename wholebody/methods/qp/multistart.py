@@ -134,7 +134,9 @@ class QPMultistart(Search):
         yield from self._from_elsewhere(min(restarts, SEARCH.inside_probes) if least else restarts)
 
     def _from_elsewhere(self, count: int) -> Iterator[Attempt[LocalSolution]]:
-        """Those from other starts, of which there are `count`."""
+        """From the seat's edge, turned each way: who fits not below a desk fits beside; then `count` others."""
+        edge = seated(self.problem, self.lineariser.state, self._start, 1.0, "arms_forward")
+        yield Attempt(self.lineariser.defined(edge), self._free, "from the seat")
         starts = self._seeded(count, self._seats[0] if self._seats else self._start)
         aimed = self.problem.goals and not (self._few() or self._least or self.out_of_reach or self._seats)
         beside = self._beside(min(count, SEARCH.beside) if aimed else 0)
@@ -247,8 +249,7 @@ class QPMultistart(Search):
                 return False
             way = -share * judged.first_order.residual
             start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
-            local = self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start)
-            self.accept(local)
+            self.accept(self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start))
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 
     def _seek_lower(self, count: int) -> None:
@@ -329,8 +330,7 @@ class QPMultistart(Search):
             self._seek_held()
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
-        aside = self.out_of_reach or self._least  # else other starts were tried
-        self._pass_things(SEARCH.reach_trials_few if aside and self._few() else 0)
+        self._pass_things(SEARCH.reach_trials_few if (self.out_of_reach or self._least) and self._few() else 0)
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
