@@ -217,7 +217,7 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
                     wrench[row + r, 3 + j] -= wrench[row + r, k] * place[m] - wrench[row + r, m] * place[k]
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(error_model="numpy")
 def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.ReachCones` and `figures.reach_cones.ReachCone.signed_angle`."""
     turn, world, local, outward = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
