@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -56,6 +57,7 @@ def mirrored(figure: Figure, q: Array, place: pin.SE3 | None = None) -> Array:
     return found
 
 
+@lru_cache(maxsize=8)  # of the figures that were mirrored last: half of the time of a short solve
 def _exchange(figure: Figure) -> tuple[Indices, Array]:
     """For each value of a posture: the value of which it takes the place, and the sign that it gets."""
     model = figure.model

@@ -155,7 +155,8 @@ class Search(Multistart[LocalSolution]):
             start, there = mirrored(figure, np.array([self._start, q]), pin.XYZQUATToSE3(self._start[:7]))
         except InputError:  # a figure that is not symmetric
             return
-        if np.abs(start - self._start).max() > 1e-3 or self._left_at(there) > 1e-3:  # m, rad
+        turned = pin.difference(figure.model, self._start, start)  # a quaternion of either sign is the same turn
+        if np.abs(turned).max() > 1e-3 or self._left_at(there) > 1e-3:  # m, rad
             return
         local = self._descend(there)
         if local.violation.worst <= tolerance and local.measure <= self.best.measure / SEARCH.lower:
