@@ -147,7 +147,7 @@ class Search(Multistart[LocalSolution]):
         figure, q, tolerance = self.problem.scene.figure, self.best.q, self.settings.tolerance
         legs = [figure.dofs(side) for side in ("left_leg", "right_leg") if side in figure.groups]
         bent = [np.linalg.norm(pin.difference(figure.model, figure.neutral, q)[leg]) for leg in legs]
-        if figure.root != "free" or len(bent) < 2 or bent[0] >= bent[1]:
+        if figure.root != "free" or len(bent) < 2 or bent[1] - bent[0] < 0.1:  # rad: less is no lunge
             return
         if self.best.violation.worst > tolerance or not self.settings.measures or self.control.over:
             return
