@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import coal
@@ -136,8 +137,12 @@ def test_a_hand_that_touches_nothing_is_told_of() -> None:
     person = wb.load("human")
     for feet in (["left_foot", "right_foot", "left_hand"], ["left_foot", "right_hand"]):
         for term in (Balance(feet), wb.ergonomics.LoadedBalance([], feet=feet)):
-            with pytest.warns(UserWarning, match="touches nothing"):
+            with pytest.warns(UserWarning, match="touches nothing") as told:
                 wb.Problem(wb.Scene(person), constraints=[term])
+            assert [str(one.message).count("touches nothing") for one in told] == [1]
+            assert repr(feet[-1]) in str(told[0].message)
     palm = person.placement(person.posture("standing"), "left_palm").translation
     desk = wb.Scene(person).add(wb.Box((0.3, 0.3, 0.02)), name="desk", at=(palm[0], palm[1], palm[2] - 0.16))
-    wb.Problem(desk, constraints=[Balance(["left_foot", "right_foot", "left_hand"])])
+    with warnings.catch_warnings(record=True) as untold:
+        wb.Problem(desk, constraints=[Balance(["left_foot", "right_foot", "left_hand"])])
+    assert not untold
