@@ -390,10 +390,21 @@ def test_a_file_that_floats_on_an_empty_link_has_one_root(root, tmp_path):
     assert figure.root == (root or "free")
     assert figure.model.nv == (1 if root == "fixed" else 7)
     srdf = tmp_path / "robot.srdf"
-    srdf.write_text("""<robot name="r"><group name="all"><joint name="hip"/></group>
-    <group_state name="home" group="all"><joint name="hip" value="0.3"/></group_state></robot>""")
+    srdf.write_text("""<robot name="r"><group name="all">
+    <chain base_link="world" tip_link="leg"/></group><group name="rest"><joint name="floating_base"/></group>
+    <group_state name="home" group="all"><joint name="hip" value="0.3"/></group_state>
+    <group_state name="off" group="rest"><joint name="floating_base" value="0 0 2 0 0 0 1"/></group_state>
+    <disable_collisions link1="world" link2="leg"/></robot>""")
     described = load(tmp_path / "robot.urdf", srdf=srdf, **({} if root is None else {"root": root}))
     for one, posture in ((figure, "neutral"), (described, "home")):  # they were at the world's origin
         placed = one.placement(one.posture(posture), "pelvis")
         np.testing.assert_allclose(placed.translation, (0.5, 0.0, 1.0), atol=1e-12)
         np.testing.assert_allclose(pin.rpy.matrixToRpy(placed.rotation), (0.0, 0.0, 0.3), atol=1e-12)
+    assert described.groups["all"] == ("hip",)  # it was empty: the link of the world is cut
+    if root == "fixed":
+        assert [note for note in described.notes if "SRDF" in note] == [
+            "SRDF: state 'off' names the joint 'floating_base', which does not move"
+        ]
+    else:
+        assert not [note for note in described.notes if "SRDF" in note]
+        np.testing.assert_allclose(described.posture("off")[:3], (0.5, 0.0, 3.0))  # from the joint's origin

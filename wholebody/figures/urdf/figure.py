@@ -192,7 +192,8 @@ def urdf_figure(
         raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
     folders = [package_dirs] if isinstance(package_dirs, (str, PathLike)) else package_dirs
     urdf = read_urdf(Path(path), [Path(folder) for folder in folders])
-    urdf, place = _without_world(urdf, root)
+    urdf, world = _without_world(urdf, root)
+    place = None if world is None else world.origin
     extension = urdf.extension
     if root is None:
         root = "free" if place is not None or (extension is not None and extension.get("root") == "free") else "fixed"
@@ -206,11 +207,11 @@ def urdf_figure(
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
     visual = visual_of_links(model, ((number, *one) for number, one in enumerate(urdf.visuals)))
     robot = Robot(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual, place=place)
-    return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples)
+    return robot_figure(robot if srdf is None else _described(robot, Path(srdf), world), samples)
 
 
-def _without_world(urdf: UrdfFile, root: str | None) -> tuple[UrdfFile, pin.SE3 | None]:
-    """The file without an empty root link on which all the rest floats, as MuJoCo takes it; and where it floats.
+def _without_world(urdf: UrdfFile, root: str | None) -> tuple[UrdfFile, UrdfJoint | None]:
+    """The file without an empty root link on which all the rest floats, as MuJoCo takes it; and the floating joint.
 
     With a fixed root the rest is fixed there.
     """
@@ -223,11 +224,11 @@ def _without_world(urdf: UrdfFile, root: str | None) -> tuple[UrdfFile, pin.SE3 
         return with_values(urdf, joints=tuple(held)), None
     links = (first[0].child, *(name for name in urdf.links[1:] if name != first[0].child))
     joints = tuple(joint for joint in urdf.joints if joint is not first[0])
-    return with_values(urdf, links=links, joints=joints), first[0].origin
+    return with_values(urdf, links=links, joints=joints), first[0]
 
 
-def _described(robot: Robot, path: Path) -> Robot:
-    known = read_srdf(path, robot.model, robot.links, robot.place)
+def _described(robot: Robot, path: Path, world: UrdfJoint | None) -> Robot:
+    known = read_srdf(path, robot.model, robot.links, world)
     owners = [robot.model.frames[piece.parentFrame].name for piece in robot.geometry.geometryObjects]
     return with_values(
         robot,

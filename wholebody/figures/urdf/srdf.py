@@ -14,6 +14,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError
 from wholebody.figures.description import ROOT_JOINT, ROUNDED, follows, zero_within_limits
+from wholebody.figures.urdf.joints import UrdfJoint
 from wholebody.figures.urdf.xml_reading import bounded, numbers, read_robot
 from wholebody.geometry.placement import FARTHEST
 
@@ -34,25 +35,33 @@ class Srdf(NamedTuple):
     notes: tuple[str, ...]  # sentences on lines that name what the URDF does not have
 
 
-def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...], place: pin.SE3 | None = None) -> Srdf:
-    """Read the SRDF of a URDF that has a model and links; a free root is at a place where a state has none."""
+def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...], world: UrdfJoint | None = None) -> Srdf:
+    """Read the SRDF of a URDF that has a model and links.
+
+    `world` is the joint of the URDF on which a free root floats: the root is at its place where a state has none.
+    """
     robot = read_robot(path, "SRDF")
-    reader = _Reader(path, robot, model, links)
+    reader = _Reader(path, robot, model, links, world)
     read = READ | {"virtual_joint"} if reader.free else READ
     unknown = sorted({str(part.tag) for part in robot if isinstance(part.tag, str)} - read)
     if unknown:
         reader.notes.append(f"SRDF: {', '.join(unknown)} is not kept")
     groups = {name: reader.joints(group, (name,)) for name, group in reader.groups.items()}
-    return Srdf(groups, reader.postures(place), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
+    return Srdf(groups, reader.postures(), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
 
 
 class _Reader:
     """One file while it is read."""
 
-    def __init__(self, path: Path, robot: Element, model: pin.Model, links: tuple[str, ...]) -> None:
-        self._path, self._robot, self._model, self._links = path, robot, model, links
+    def __init__(
+        self, path: Path, robot: Element, model: pin.Model, links: tuple[str, ...], world: UrdfJoint | None
+    ) -> None:
+        self._path, self._robot, self._model, self._world = path, robot, model, world
+        self._links = links if world is None else (world.parent, *links)
         self.groups = {str(group.get("name")): group for group in robot.findall("group")}
         self._virtual = {str(joint.get("name")) for joint in robot.findall("virtual_joint")}
+        if world is not None:
+            self._virtual.add(world.name)
         self.free = model.existJointName(ROOT_JOINT)
         # Pinocchio's name of a free root stands in files that have no virtual joint
         self._roots = {ROOT_JOINT, *self._virtual} if self.free else set()
@@ -89,20 +98,20 @@ class _Reader:
                 self.notes.append(f"SRDF: group {shown(inside[-1])} names {shown(name)}, which is no other group")
         return tuple(sorted(found, key=self._movable.__getitem__))
 
-    def postures(self, place: pin.SE3 | None) -> dict[str, Array]:
+    def postures(self) -> dict[str, Array]:
         """Named states as postures; joints that a state does not name are at zero, or at the limit nearest to it."""
         elements = self._robot.findall("group_state")
         names = [str(state.get("name")) for state in elements]
         found: dict[str, Array] = {}
         for state, name in zip(elements, names, strict=True):
             q = zero_within_limits(self._model)
-            if place is not None:
-                q[:7] = pin.SE3ToXYZQUAT(place)
+            if self._world is not None:
+                q[:7] = pin.SE3ToXYZQUAT(self._world.origin)
             for joint in state.findall("joint"):
                 known = str(joint.get("name"))
                 where = f"{self._path}: state {shown(name)}: joint {shown(known)}"
                 if known in self._roots:
-                    q[:7] = _free_placement(joint, where)
+                    q[:7] = self._on_the_world(known, _free_placement(joint, where))
                     continue
                 if known not in self._movable:
                     self.notes.append(f"SRDF: state {shown(name)} names the joint {shown(known)}, which does not move")
@@ -117,6 +126,12 @@ class _Reader:
                 self.notes.append(f"SRDF: state {shown(called)} is there twice; the last one is kept")
             found[called] = q
         return found
+
+    def _on_the_world(self, joint: str, value: Array) -> Array:
+        """Position and quaternion (7,) in the world of a root; a joint of the URDF moves from its own origin."""
+        if self._world is None or joint != self._world.name:
+            return value
+        return np.asarray(pin.SE3ToXYZQUAT(self._world.origin * pin.XYZQUATToSE3(value)))
 
     def _within(self, place: int, value: float) -> bool:
         least, most = self._model.lowerPositionLimit[place], self._model.upperPositionLimit[place]
@@ -153,6 +168,8 @@ class _Reader:
         return first and second
 
     def _carrier(self, link: str) -> int:
+        if self._world is not None and link == self._world.parent:
+            return 0  # the universe
         return int(self._model.frames[self._model.getFrameId(link, pin.FrameType.BODY)].parentJoint)
 
 
