@@ -89,6 +89,24 @@ def test_the_nearest_posture_holds_what_must_hold(standing, honest):
     assert max(local.violation.hold, local.violation.elastic) <= 1e-5
 
 
+def test_no_goal_is_worth_an_overlap_however_short_its_lever(tmp_path):
+    """A beam on a hinge beside a ball: a millimetre in the ball moves the tip by twenty."""
+    (tmp_path / "beam.urdf").write_text("""<robot name="beam"><link name="base"/><link name="tip"/><link name="beam">
+    <collision><origin xyz="0.6 0 0"/><geometry><box size="1.2 0.04 0.04"/></geometry></collision></link>
+    <joint name="hinge" type="revolute"><parent link="base"/><child link="beam"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+    <joint name="end" type="fixed"><parent link="beam"/><child link="tip"/><origin xyz="1.2 0 0"/></joint></robot>""")
+    scene = wb.Scene(wb.load(tmp_path / "beam.urdf")).add(wb.Sphere(0.01), name="ball", at=(0.06, 0.0, 0.0))
+    touching, asked = np.arcsin((0.02 + 0.01) / 0.06), np.deg2rad(25.0)
+    target = (1.2 * np.cos(asked), 1.2 * np.sin(asked), 0.0)
+    problem = wb.Problem(scene, start=np.array([0.6]), goals=[wb.Point("tip", target)])
+    with problem.borrow() as workspace, Control(np.inf) as control:
+        local = closest(problem, workspace, control, 0.0, 1e-5, 100).run(problem.start)
+    assert local.converged
+    assert local.violation.elastic <= 1e-5
+    assert local.q[0] == pytest.approx(touching, abs=1e-3)
+
+
 def test_what_must_hold_and_cannot_is_infeasible(standing, honest):
     """A hand above three metres, with both feet on the floor, and no goal."""
     plane = wb.Plane("right_palm", (0.0, 0.0, 1.0), point=(0.0, 0.0, 3.0), side="above")

@@ -38,6 +38,7 @@ class Met(NamedTuple):
     free: Array | None = None  # (nq,) a posture that does, where q is the start instead, as all ends were blocked
     through: Array | None = None  # (nq,) the end of least effort that does not keep its clearances, where known
     near: tuple[Array, ...] = ()  # where no posture meets the goals: free ones that come near them, q the nearest
+    rest: float = 0.0  # least norm of the goals' errors [m, rad] at which descents through things rest then
 
     @property
     def begins(self) -> tuple[Array, ...]:
@@ -320,7 +321,7 @@ class Descents:
             if len(values) == SEEDS.near:
                 break
         begins = tuple([self.chain.posture(each, at) for each in values]) or (at,)
-        return Met(begins[0], tuple(self.trace), False, near=begins)
+        return Met(begins[0], tuple(self.trace), False, near=begins, rest=float(found[:, 0].min()))
 
     def _descended(self, seeds: Array, asked: Array) -> tuple[Array, int]:
         """What is found (k, 4) from seeds (k, n), which become ends, and how many were taken."""

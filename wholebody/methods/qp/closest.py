@@ -3,6 +3,7 @@
 With F the force that the weighted residual puts on a point p of a body, and w_j, v_j the angular and linear velocity
 that joint j gives it, it is ``d2/dq_j dq_k (F . p) = F . (w_j x (v_k + w_k x p))``, j between the root and k, for goals
 and, by their multipliers, for holds (Nocedal and Wright 2006, section 18.1). Its positive part joins as soft rows.
+Where a descent rests although constraints are violated, the penalty on these grows (section 17.2, framework 17.2).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from wholebody.base.arrays import Array, with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Stage
-from wholebody.methods.qp.quadratic_program import Rows, StepSize
+from wholebody.methods.qp.quadratic_program import Rows, StepSize, Violation
 from wholebody.methods.qp.settings import NEAREST, SEARCH
 from wholebody.methods.qp.solvers.base import WorkingSet
 from wholebody.methods.qp.subproblem import compiled_kernel
@@ -43,17 +44,24 @@ class Closest(Stage):
         """Find the translations of free roots."""
         model = self.shared.lineariser.state.model
         free = [joint.idx_v for joint in model.joints if joint.shortname() == "JointModelFreeFlyer"]
+        self._share = 1.0  # of the goals against constraints
         self._walk = np.array([first + k for first in free for k in range(3)], dtype=np.intp)
 
     def look(self, q: Array, longest: float = np.inf) -> Iterate:
         """See `Stage.look`."""
-        return self.iterate_at(q, NEAREST.within if self.contacts else 0.0, longest)
+        here = self.iterate_at(q, NEAREST.within if self.contacts else 0.0, longest)
+        here.rows.soft_weight[: here.rows.goals] *= self._share
+        return here
+
+    def _merit(self, violation: Violation) -> float:
+        return violation.total - (1.0 - self._share) * violation.goal
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits and constraints, shape (nq,)."""
         working_set, subproblem, control = WorkingSet(self.shared.solver), self.shared.subproblem, self.shared.control
         enough = self.tolerance
         flat = NEAREST.flat if self.contacts else NEAREST.nearly_flat
+        self._share = 1.0
         here = self.look(start)
         push = np.zeros(len(here.rows.soft_error))
         radius, used, converged = NEAREST.radius, 0, False
@@ -75,19 +83,24 @@ class Closest(Stage):
             )
             x = working_set.solve(program, rows.key).x
             predicted = subproblem.violation(rows, x)
-            pull = float(rows.soft_weight[: rows.goals].max(initial=1.0))
+            pull = float(rows.soft_weight[: rows.goals].max(initial=0.0)) or 1.0
             goal = np.sqrt(predicted.goal**2 + float(weight @ (bend @ x) ** 2) / pull)
-            gain = here.violation.total - with_values(predicted, goal=float(goal)).total
+            total = self._merit(here.violation)
+            gain = total - self._merit(with_values(predicted, goal=float(goal)))
             held = not self.contacts or max(here.violation.hold, here.violation.elastic) <= enough
-            if gain <= (flat * here.violation.total if held else enough):
-                converged = True
-                break
+            if gain <= (flat * total if held else enough):
+                if held or self._share <= NEAREST.least_share:
+                    converged = True
+                    break
+                self._share *= 0.1
+                here, bent, radius = self.look(here.at.q), None, NEAREST.radius
+                continue
             step = float(np.abs(x).max(initial=0.0))
             there = self.moved(here, x)
             if there is None:
                 radius = SHRINK * min(radius, step)
                 continue
-            ratio = (here.violation.total - there.violation.total) / gain
+            ratio = (total - self._merit(there.violation)) / gain
             blocked = ratio > WORTH and self.contacts and self.jumps(here, there)
             if ratio < POOR or blocked:
                 radius = SHRINK * min(radius, step)

@@ -83,7 +83,7 @@ class QP(Settings, Descends):
             return ending
         search = QPMultistart(problem, workspace, self._qp_solver(), self, control)
         begin, before = ((), ()) if met is None else (() if met.complete else met.begins, met.trace)
-        known = () if met is None else (met.blocked, met.near, _measure(problem, workspace, met.through))
+        known = () if met is None else (met.blocked, met.near, met.rest, _measure(problem, workspace, met.through))
         best = search.run(begin, *known)
         starts = f"{search.tried} start{'s' * (search.tried != 1)}"
         return Ending(

@@ -17,7 +17,7 @@ from wholebody.methods.control import Control
 from wholebody.methods.qp.closest import ENDLESS, Closest, reach_trials
 from wholebody.methods.qp.iterates import LocalSolution, held
 from wholebody.methods.qp.search import Search
-from wholebody.methods.qp.settings import SEARCH, Settings
+from wholebody.methods.qp.settings import SEARCH, SEEDS, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.start_postures import at_its_place, before_contact, posture_apart
@@ -42,15 +42,19 @@ class QPMultistart(Search):
         self._doubtful = self.out_of_reach = False  # whether the start may lead lower than a squat; as it seems
 
     def run(
-        self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = (), least: float = 0
+        self, begin: tuple[Array, ...] = (), other: Array | None = None, near: tuple[Array, ...] = (),
+        rest: float = 0.0, least: float = 0.0,
     ) -> LocalSolution:  # fmt: skip
         """The best of attempts, from `begin` first, and a descent from `other`; out of reach, the closest to `near`."""
-        # `least`: measures where the goals are known to be met, if through things; 0 where nothing is known
+        # `rest`: residual at which descents through things rest; `least`: measures where the goals are known to be met,
+        # if through things; 0 where nothing is known
         self.out_of_reach, self._through_measure = bool(near), least
         self.contradictions = contradictions(self.problem, self.lineariser.workspace) if near else ()
         if not near:
             self.search(self._attempts(begin))
             other = self._start if self._doubtful and self.how == "from a squat" else other
+        else:
+            self._rest = max(rest, SEEDS.deep)
         for q in near:
             self.accept(self._ran(self._closest(), q))
         if other is not None:
@@ -330,7 +334,8 @@ class QPMultistart(Search):
             self._seek_held()
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
-        self._pass_things(SEARCH.reach_trials_few if (self.out_of_reach or self._least) and self._few() else 0)
+        many = SEARCH.reach_trials_few if self._rest is None else SEARCH.agreeing_few
+        self._pass_things(many if (self.out_of_reach or self._least) and self._few() else 0)
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
@@ -339,7 +344,7 @@ class QPMultistart(Search):
     def _seek_held(self) -> None:
         """Seek a posture that keeps the constraints, as near to the goals as any; then one without goals."""
         tolerance, near = self.settings.tolerance, self._near
-        if near is not None and (self.out_of_reach or self._least):  # else other starts were tried
+        if near is not None and (self.out_of_reach or self._least) and not self._few():  # else others were tried
             self._missed = SEARCH.agree * near.violation.left
             self._in_contact = []
             self.search(self._from_elsewhere(self.settings.restarts))

@@ -47,6 +47,7 @@ class Search(Multistart[LocalSolution]):
         self._first: int | None = None  # programs of the first attempt, once it is made
         self._start = problem.scene.figure.clamp(problem.start)
         self._near: LocalSolution | None = None  # of all ends, also through things, the nearest to the goals
+        self._rest: float | None = None  # m: residual at which others came to rest through things
         self._resting: tuple[Array, ...] = ()  # where other descents through things rest as near (nq,)
         self._missed = 0.0  # goals' residual with which a search ends, metres
 
@@ -200,7 +201,8 @@ class Search(Multistart[LocalSolution]):
             zip_longest((near.q, *self._resting), self._seeded(count, self._start) if count else ())
         ):
             missed = self.best.violation
-            met = missed.worst <= self.settings.tolerance or missed.total <= SEARCH.agree * near.violation.total
+            rest = near.violation.total if self._rest is None else self._rest
+            met = missed.worst <= self.settings.tolerance or missed.total <= SEARCH.agree * rest
             if met or alike([end.violation.total for end in ends]):
                 return
             if q is not None:

@@ -49,7 +49,7 @@ class ProgramNumbers(NamedTuple):
 
     proximal_share: float = 0.01  # of the curvature where measures do not count: it still says which joints move
     hold_share: float = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
-    elastic_share: float = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+    elastic_share: float = 10.0  # and a metre of overlap
     lever: float = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
     least_curvature: float = 1e-3  # share of the largest that a degree of freedom has which no measure speaks for
     # m per rad of radius that one program asks for. Larger: fewer iterations in the open, more rejected in clutter.
@@ -139,6 +139,8 @@ class NearestNumbers(NamedTuple):
     # programs; more: shorter steps, ends farther off (at 0.2 by centimetres).
     damping: float = 3e-2
     negligible: float = 1e-2  # share of the largest curvature below which a direction is left out
+    # least share of the goals against constraints. Larger: limbs stay inside of what moves goals farther than itself.
+    least_share: float = 1e-3
 
 
 class SearchNumbers(NamedTuple):
