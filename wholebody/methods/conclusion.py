@@ -33,6 +33,7 @@ from wholebody.solution import Solution, Status, TraceEntry
 from wholebody.tasks.balance import Balance
 
 PAIR = "the clearance of a pair"  # in messages
+OPTIMAL = 1e-3  # m, rad: first-order optimality from which on a missed goal is at no minimum: such a search stalled
 
 
 class Ending(NamedTuple):
@@ -52,7 +53,7 @@ class Ending(NamedTuple):
     # number of quadratic programs that each solver closed; empty for a method without programs
     programs: Mapping[str, int] = MappingProxyType({})
     method: str = ""  # what was run, where that says more than the method's name
-    unreached: str = "not reachable from here"  # what the search knows of goals that are missed
+    unreached: str = ""  # what the search knows of goals that are missed, beyond where it ended
 
 
 def assessed_tolerance(tolerance: float) -> float:
@@ -99,7 +100,9 @@ def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool)
         return "infeasible" if settled or ending.failure else "stalled"
     if judgement.met(enough):
         return "solved"
-    return "unreachable" if settled else "stalled"
+    # steps that gain little, or along one joint at a time, end far from a minimum too
+    minimum = bool(ending.unreached) or judgement.optimality <= OPTIMAL
+    return "unreachable" if settled and minimum else "stalled"
 
 
 def _message(problem: Problem, status: Status, judgement: Assessment, ending: Ending, enough: float) -> str:
@@ -109,9 +112,9 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     if ending.failure:
         return f"{ending.failure}: {left}"
     if status == "unreachable":
-        return f"{ending.unreached}: nothing is violated, {left}"
+        return f"{ending.unreached or 'not reachable from here'}: nothing is violated, {left}"
     if judgement.holds(enough):
-        return f"ran out of {ending.unit}: {left}"
+        return f"{'stopped before the closest posture' if ending.settled else f'ran out of {ending.unit}'}: {left}"
     name, missed = _worst(problem, judgement, ending.q)
     why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     if (CONTACTS if name == PAIR else name) in ending.left_out:

@@ -226,3 +226,17 @@ def test_hands_that_hold_each_other_stay_together_where_no_posture_is_free() -> 
     q = wb.methods.CCD(restarts=0).tracker(problem, dt=0.02).frame(problem.start).q
     (loop,) = (term for term in problem.constraints if isinstance(term, wb.Hold))
     assert np.abs(loop.value(scene.state(q))).max() < 1.1e-3  # m, rad: as goals on the way
+
+
+def test_where_descents_would_go_on_goals_are_not_called_unreachable() -> None:
+    """Of 24 targets of a hand beside a table 11 that are reachable were called unreachable from here."""
+    scene = wb.Scene(wb.load("human")).add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.55, 0.0, 0.75))
+    rng, stalled = np.random.default_rng(5), 0
+    for target in rng.uniform((0.1, -0.8, 0.05), (1.0, 0.5, 2.1), (12, 3)):
+        problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", target)], constraints=[wb.Freeze("root")])
+        solution = wb.solve(problem, method="ccd")
+        if solution.status == "unreachable" and not solution.message.startswith("the problem contradicts itself"):
+            assert solution.assessment.optimality <= 1e-3
+        stalled += solution.status == "stalled"
+        assert (solution.status == "stalled") <= solution.message.startswith("stopped before the closest posture")
+    assert stalled > 4
