@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -52,6 +51,7 @@ from wholebody.motion.touching import Touched
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
+QUARTERS = 4  # at which motions between frames are looked at
 # a clip whose points jerk so many times as those of the free fit, and so much [m/s³], or that overlaps so, is beyond
 # what it should be; so many times beyond, it is stuck at an edge, and is sought once more with feet that lag so much.
 # Of both the one is kept with the least product of errors of bones and of how many times it is beyond
@@ -90,7 +90,7 @@ def retarget(
         where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
         touch it at the same place, and go with it; hands that meet do so. In every frame the figure is free of itself,
         of the ground and of things where the holds and limits leave room for it; between frames too, as seen at some
-        places of each motion, unless things move. Overlaps of 2 mm or more in frames, or in the middle between two, are
+        places of each motion, unless things move. Overlaps of 2 mm or more in frames, or at quarters between two, are
         told. What `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
 
     Raises:
@@ -230,24 +230,24 @@ def _held(
 
 
 def _depths(fitter: Fitter, holds: Holds, q: Array) -> Array:
-    """How deep frames (n, nq), and middles of motions to the next, overlap (n, 2), metres."""
-    ways = [pin.interpolate(fitter.model, *ends, 0.5) for ends in pairwise(q)]
-    depths = np.zeros((len(q), 2))
+    """How deep frames (n, nq), and motions to the next, overlap at quarters (n, 4), metres."""
+    depths = np.zeros((len(q), QUARTERS))
     for frame, posture in enumerate(q):
         fitter.see(holds.moved(frame))
-        depths[frame, 0] = fitter.depth(posture)
-        if frame < len(ways) and not holds.moved(frame):
-            depths[frame, 1] = fitter.depth(ways[frame])
+        between = frame + 1 < len(q) and not holds.moved(frame)
+        for late in range(QUARTERS if between else 1):
+            there = pin.interpolate(fitter.model, posture, q[frame + 1], late / QUARTERS) if late else posture
+            depths[frame, late] = fitter.depth(there)
     return depths
 
 
 def _said_inside(fitter: Fitter, holds: Holds, q: Array, depths: Array) -> str:
-    """What is known of frames (n, nq), and middles of motions to the next, that overlap deeply; empty without one."""
+    """What is known of frames (n, nq), and motions to the next, that overlap deeply; empty without one."""
     worst, late = np.unravel_index(int(depths.argmax()), depths.shape)
     if depths.max() < DEEP:
         return ""
     fitter.see(holds.moved(int(worst)))
-    deep = pin.interpolate(fitter.model, q[worst], q[worst + 1], 0.5) if late else q[worst]
+    deep = pin.interpolate(fitter.model, q[worst], q[worst + 1], late / QUARTERS) if late else q[worst]
     first, second = fitter.deepest(deep)
     return (
         f"{(depths.max(axis=1) >= DEEP).sum()} of {len(q)} frames, or motions to the next, overlap by "
