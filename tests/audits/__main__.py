@@ -292,30 +292,6 @@ def postures(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
-    "clips",
-    "recordings retargeted, beside mink frame by frame with GMR's weights",
-    "Follow every recording (BVH) below a folder by wholebody and by mink, and judge both alike.",
-    option("folder", type=Path, metavar="FOLDER", help="folder of recordings"),
-    count("--frames", 60, "frames of each recording that are followed"),
-    listed("--figure", "figures that follow; those of files go about freely (default: the person)", "FIGURE"),
-)
-def clips_compared(arguments: argparse.Namespace) -> None:
-    """Follow by both tools; --quick follows 20 frames."""
-    from tests.audits.clips import ABOUT, compare, totals
-    from wholebody.figures import load
-
-    names = arguments.figure or ["human"]
-    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
-    rows = []
-    for row in compare(arguments.folder, figures, 20 if arguments.quick else arguments.frames):
-        rows.append(row)
-        print(in_words(row), flush=True)
-    facts = machine() | {"frames": str(arguments.frames)}
-    text = report(ABOUT, {"All clips": totals(rows), "Each": rows}, facts)
-    publish("clips", text, arguments, facts=facts, tables={"clips": rows})
-
-
-@measuring(
     "throws",
     "things thrown at a person, and whether any passes through without a word",
     "Throw things at a person who stands, walks or is dragged, for about ten minutes. The exit code is 1 "
@@ -351,7 +327,7 @@ def docs(arguments: argparse.Namespace) -> None:
         print(f"wrote {put(file, arguments.docs, arguments.name)}")
 
 
-COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans, clips_compared, throws, docs)
+COMMANDS = (newton, qp, human, postures, regress, loads, detail, ablation, robots, plans, throws, docs)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -119,6 +119,16 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
             count("--jobs", 1, "cases at a time"),
         )(later("bench.measurements.measure_motion")),
         measuring(
+            "clips",
+            "recordings retargeted, beside mink frame by frame as General Motion Retargeting does",
+            "Follow every recording (BVH) below a folder by wholebody and by mink with the stages, weights and damping "
+            "of General Motion Retargeting, without contact, and judge both alike: errors of bones, depth, slide, jerk "
+            "and frames a second.",
+            path("folder", "FOLDER", "of recordings"),
+            count("--frames", 60, "frames of each recording that are followed"),
+            listed("--figure", "figures that follow; URDF files go about freely (default: human)", "FIGURE"),
+        )(later("bench.measurements.measure_clips")),
+        measuring(
             "world",
             "things that move by themselves, beside MuJoCo and Rapier",
             "Drop, slide and stack the same things in wholebody, MuJoCo and Rapier.",

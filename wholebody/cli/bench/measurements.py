@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `scaling`, `motion`, `world` and `files`: what things cost and achieve."""
+"""`wholebody bench step`, `scaling`, `motion`, `clips`, `world` and `files`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.bench.measure import motion, scaling, step
+from wholebody.bench.measure.clips import TOOLS, compare, totals
 from wholebody.bench.measure.files import read
 from wholebody.bench.measure.motion import EQUIPMENT, SYNTHETIC, recorded, recordings, synthetic
 from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
@@ -105,6 +106,21 @@ def measure_motion(arguments: argparse.Namespace) -> None:
     cases = avoid_many(given, folder, equipment=worn, methods=methods, jobs=arguments.jobs, progress=tell)
     charts = _charts("motion", motion.panels(cases), "Share of the cases freed within a deviation, a jerk and a time")
     publish("motion", motion.motion_report(cases, facts), arguments, charts=charts)
+
+
+def measure_clips(arguments: argparse.Namespace) -> None:
+    """Follow by the installed tools; --quick follows 20 frames."""
+    names = arguments.figure or ["human"]
+    figures = [load(name, root="free") if Path(name).suffix == ".urdf" else load(name) for name in names]
+    frames, rows = 20 if arguments.quick else arguments.frames, list[Row]()
+    facts = machine() | {"frames": str(frames)}
+    for row in compare(arguments.folder, figures, frames):
+        rows.append(row)
+        print(in_words(row), flush=True)
+    lacking = set(TOOLS) - {row.tool for row in rows}
+    notes = [f"Left out: {tool}, which is not installed (extra `compare`)." for tool in sorted(lacking)]
+    text = report(texts()["clips"], {"All clips": totals(rows), "Each": rows}, facts, notes)
+    publish("clips", text, arguments, facts=facts, tables={"clips": rows})
 
 
 def measure_world(arguments: argparse.Namespace) -> None:

@@ -10,10 +10,11 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from tests.audits.clips import compare, judged, totals
 from tests.motion.test_retargeting import person
 from wholebody.base.errors import InputError
+from wholebody.bench.measure.clips import compare, judged, totals
 from wholebody.bench.rows import Row
+from wholebody.cli.main import main
 from wholebody.motion.roles import matched
 from wholebody.motion.stance import point_paths
 
@@ -108,3 +109,13 @@ def test_both_tools_follow_a_recording(tmp_path: Path) -> None:
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no \.bvh files"):
         list(compare(tmp_path, [wb.load("human")], 4))
+
+
+def test_the_command_writes_what_the_installed_tools_do(tmp_path: Path) -> None:
+    figure, folder = wb.load("human"), tmp_path / "clips"
+    folder.mkdir()
+    wb.Clip(figure, np.tile(figure.posture("standing"), (4, 1)), 1 / 30, "stands").write(folder / "stands.bvh")
+    assert main(["bench", "clips", str(folder), "--quick", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "clips.md").read_text()
+    assert "| stands, human | wholebody |" in text
+    assert ("| stands, human | mink, GMR's weights |" in text) != ("Left out: mink" in text)

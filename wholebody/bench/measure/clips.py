@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array, Mask, with_values
-from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.errors import InputError
 from wholebody.bench.rows import Figure, Row
 from wholebody.bench.suite.adapters.mink import Order
 from wholebody.bench.suite.adapters.urdf import mjcf, own_frame
@@ -35,22 +36,18 @@ from wholebody.motion.structure import LIMBS, upright
 from wholebody.motion.surfaces import surface_of
 from wholebody.motion.thing_contacts import NEAR, Things
 
-ABOUT = """\
-Recordings retargeted by `wb.retarget` on the ground that it finds, and by mink frame by frame with the stages, \
-weights and damping of General Motion Retargeting, without contact; there rotations and lengths of limbs come from \
-the rest postures, as here. Both are judged alike: bones by the angle to the recording's, overlaps with the floor \
-and the body itself by `wb.check`, slide as the speed of ankles and toes from one frame in which those of the \
-recording rest to the next, jerk of all joints' places in parts of the recording's at the same size. Times are the \
-processor's, with the model's set-up."""
-"""What the report says above its tables."""
-
 TOOLS = ("wholebody", "mink, GMR's weights")
 # m: as far from a moving thing are joints of parts that go with it
 CARRIED = {"ankle": 0.15, "toe": 0.1, **NEAR}
 
 
 def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator[Row]:
-    """A row for each recording (BVH) in a folder, figure and tool, of `frames`; InputError without recordings."""
+    """A row for each recording (BVH) in a folder, figure and installed tool, of `frames`.
+
+    Raises:
+        InputError: a folder without recordings.
+    """
+    tools = TOOLS if find_spec("mink") else TOOLS[:1]
     files = sorted(folder.rglob("*.bvh"))
     if not files:
         raise InputError(f"{folder}: there are no .bvh files; give a folder of recordings")
@@ -61,7 +58,7 @@ def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # warnings about a recording are the same for both tools
                 roles = matched(motion, figure, None)
-                for tool in TOOLS:
+                for tool in tools:
                     began = time.process_time()
                     clip = _followed(tool, motion, figure, roles)
                     rate = len(motion) / (time.process_time() - began)
@@ -169,11 +166,9 @@ class MinkRetargeting:
     """Postures of a figure that follow a skeleton."""
 
     def __init__(self, motion: SkeletonMotion, figure: wb.Figure, roles: Roles) -> None:
-        try:
-            import mink
-            import mujoco
-        except ImportError:
-            raise MissingPackageError("mink is not installed; install: pip install 'wholebody[compare]'") from None
+        import mink
+        import mujoco
+
         self._mink = mink
         roles_used = [role for role in roles.frames if role.split("_")[-1] in WEIGHTS and role in roles.joints]
         segments = {row["role"]: row["wholebody"] for row in ROWS}  # those that carry limbs of a person
