@@ -13,6 +13,7 @@ from wholebody.bench.measure.motion import recorded, synthetic
 from wholebody.bench.rows import Row, only
 from wholebody.bench.rows import report as tables_of
 from wholebody.figures import load
+from wholebody.figures.strength import Strength
 from wholebody.motion.avoidance import avoid
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip import Clip
@@ -20,7 +21,6 @@ from wholebody.motion.clip_torques import torques
 from wholebody.motion.load_change import PLACE, LoadChange
 from wholebody.motion.measures import deviation, foot_sliding
 from wholebody.motion.stance import usual_feet
-from wholebody.motion.strength import Strength
 from wholebody.motion.worn_equipment import dressed
 
 WAYS = ("before", "avoided", "avoided with dynamics")

@@ -10,9 +10,9 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.postures import support
+from wholebody.figures.strength import Strength
 from wholebody.motion.clip_torques import smoothed, torques
 from wholebody.motion.inverse_dynamics import ground_forces
-from wholebody.motion.strength import Strength
 
 GRAVITY = 9.81
 

@@ -16,7 +16,7 @@ from wholebody.cli.tables import console, table
 from wholebody.ergonomics.angles import check_person
 from wholebody.ergonomics.assessment import ergonomics_of
 from wholebody.ergonomics.work import Work
-from wholebody.motion.strength import Strength
+from wholebody.figures.strength import Strength
 from wholebody.taskfile import result
 
 OF_SCORES = {*OF_WORK, "load", "coupling", "seated", "sex", "percentile"}

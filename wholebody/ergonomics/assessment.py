@@ -12,7 +12,7 @@ from wholebody.ergonomics.exertion import StaticTorques, static_torques
 from wholebody.ergonomics.observation import Owas, Reba, Rula, owas_of, reba_of, rula_of
 from wholebody.ergonomics.work import Work, seen
 from wholebody.figures.figure import Figure
-from wholebody.motion.strength import Strength
+from wholebody.figures.strength import Strength
 from wholebody.scene.scene import Scene
 
 Color = tuple[float, float, float, float]

@@ -17,7 +17,7 @@ from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.motion.strength import Shoulder, Strength, shoulders
+from wholebody.figures.strength import Shoulder, Strength, shoulders
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 from wholebody.tasks.base import ComputedTogether, Term, filled

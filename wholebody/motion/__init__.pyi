@@ -12,6 +12,6 @@ from wholebody.motion.skeleton import SkeletonMotion as SkeletonMotion
 from wholebody.motion.stance import StanceFeet as StanceFeet
 from wholebody.motion.standing_ground import Ground as Ground, ground as ground
 from wholebody.motion.streaming import Retargeter as Retargeter
-from wholebody.motion.strength import Strength as Strength
+from wholebody.figures.strength import Strength as Strength
 from wholebody.motion.trajectory.method import Trajectory as Trajectory
 from wholebody.motion.worn_equipment import Equipment as Equipment, equipment as equipment

@@ -19,6 +19,7 @@ import pinocchio as pin
 from wholebody.base.arrays import with_values
 from wholebody.base.checks import a, flag, function, instance, listed, shown, warn
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
+from wholebody.figures.strength import Strength
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Run, Watch, has_setting
 from wholebody.motion.checking import ClipCheck, check
@@ -31,7 +32,6 @@ from wholebody.motion.load_change import LoadChange
 from wholebody.motion.measures import MotionBounds, resolved
 from wholebody.motion.resting_hands import RestingHands
 from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
-from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze
 from wholebody.tasks.base import Bound

@@ -16,11 +16,11 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State
+from wholebody.figures.strength import Strength
 from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, depth, dip_depth, faults
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.strength import Strength
 from wholebody.motion.windows import Window, windows
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene

@@ -17,13 +17,13 @@ from wholebody.base.arrays import Array, Mask, cross
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
+from wholebody.figures.strength import Strength, torque_limits
 from wholebody.geometry.placement import steady
 from wholebody.geometry.proximity import Contacts
 from wholebody.motion.clip import Clip, same_joints
 from wholebody.motion.footholds import RestLimits
 from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, Stand, Touches, foot_wrenches
 from wholebody.motion.stance import FEET, own_feet, standing_feet
-from wholebody.motion.strength import Strength, torque_limits
 from wholebody.scene.scene import Scene
 from wholebody.tasks.forces import FRICTION
 
@@ -42,7 +42,7 @@ class Torques:
         torque: (n, nv) torque of each joint, N m (force of sliding joints, N), after the ground's forces; positive
             towards positive angles. The six columns of a free root hold what is missing (see there).
         strained: (n, nv) the same about the axes to which strength applies: those of the joints, but of a shoulder's
-            flexion the one across the upper arm (`wholebody.motion.strength.Shoulder`), as in `wb.ergonomics`.
+            flexion the one across the upper arm (`wholebody.figures.strength.Shoulder`), as in `wb.ergonomics`.
         feet: names of the feet, and after them of other segments that touch things.
         force: (n, feet, 3) force of the ground or of things on each of these, N, in the world. It acts on the segment;
             the joint of the toes bears nothing.

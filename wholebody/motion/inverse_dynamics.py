@@ -17,8 +17,8 @@ from wholebody.base.arrays import Array, Indices, cross, with_values
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import one_figure
+from wholebody.figures.strength import shoulders, with_strength_axes
 from wholebody.motion.stance import pieces_on
-from wholebody.motion.strength import shoulders, with_strength_axes
 from wholebody.tasks.balance import DOWN, convex_polygon
 from wholebody.tasks.surfaces import outermost
 
@@ -110,7 +110,7 @@ class Loads(NamedTuple):
     """Loads of one frame."""
 
     torque: Array  # (nv,) of the joints, N m, after the ground's forces; the root's part is what is missing
-    strained: Array  # (nv,) the same about the axes of strength, see `wholebody.motion.strength.Shoulder`
+    strained: Array  # (nv,) the same about the axes of strength, see `wholebody.figures.strength.Shoulder`
     wrench: Array  # (6,) that the feet's ground has to give: force N, and moment about the world's origin N m
     ground: GroundForces  # what it gives; about the centre of mass
     center: Array  # (3,) centre of mass, metres

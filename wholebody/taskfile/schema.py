@@ -13,9 +13,9 @@ from wholebody.base.fields import Range, Vector
 from wholebody.figures.adjustable import ADJUSTABLE
 from wholebody.figures.anthropometry import AGE, CLOTHING, MASS, PERCENTILE, SHOES, STATURE
 from wholebody.figures.link_pieces import CONCAVITY
+from wholebody.figures.strength import Strength
 from wholebody.geometry import shapes
 from wholebody.geometry.pieces import SMALLEST
-from wholebody.motion.strength import Strength
 from wholebody.problem import CLEARANCE
 from wholebody.scene.matter.body import BallJoint, Body, Hinge
 from wholebody.taskfile import kinds

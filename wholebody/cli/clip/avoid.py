@@ -16,6 +16,7 @@ from wholebody.cli.clip.arguments import (
     skeleton_of,
 )
 from wholebody.cli.tables import bar, console, table
+from wholebody.figures.strength import Strength
 from wholebody.motion.avoidance import as_avoider, avoid
 from wholebody.motion.avoider import Avoider, has_setting
 from wholebody.motion.batch import BatchProgress, avoid_many
@@ -23,7 +24,6 @@ from wholebody.motion.batch_table import AvoidedCase
 from wholebody.motion.files import check_ending
 from wholebody.motion.judging import Avoided
 from wholebody.motion.reading import read_clip
-from wholebody.motion.strength import Strength
 from wholebody.motion.worn_equipment import put_on
 from wholebody.view.motion_curves import motion_curves
 

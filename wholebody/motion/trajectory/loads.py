@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask, with_values
 from wholebody.figures.figure import Figure
+from wholebody.figures.strength import Strength, torque_limits
 from wholebody.motion.clip import Clip, between
 from wholebody.motion.clip_torques import CUTOFF, bearing, smoothed
 from wholebody.motion.frame_terms import FrameTerms
@@ -30,7 +31,6 @@ from wholebody.motion.inverse_dynamics import (
     zero_moment_point,
 )
 from wholebody.motion.stance import standing_feet
-from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
 from wholebody.scene.scene import Scene

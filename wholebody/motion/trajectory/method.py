@@ -12,12 +12,12 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.fields import Checked, Range
+from wholebody.figures.strength import Strength
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip import Clip, between
 from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.stance import standing_feet
-from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
