@@ -1,8 +1,8 @@
 """The protocol of methods that free a clip: what each of them gets, and what it returns.
 
 `avoid` sets up one `Run`, has the method make postures of it, repairs what the method leaves to the shared repair, and
-judges the answer. So a method has no judge, repair or report of its own. `keep_back` and `followed` keep postures on one
-side of what the original motion passes through, which no rows of contact bring a limb out of.
+judges the answer. So a method has no judge, repair or report of its own. `keep_back` and `followed` keep postures on
+one side of what the original motion passes through, which no rows of contact bring a limb out of.
 """
 
 from __future__ import annotations
