@@ -32,7 +32,7 @@ def scripts(tmp_path: Path) -> list[Path]:
 
 def test_each_script_is_run_and_told(scripts: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     good, bad = write_gallery(scripts, tmp_path / "gallery.html")
-    assert (good.story, good.numbers, good.failed) == ("A <small> story.", "solved", False)
+    assert (good.about, good.numbers, good.failed) == ("A <small> story.", "solved", False)
     assert (len(good.pictures), "turned" in good.scene, good.code.startswith("import argparse")) == (1, True, True)
     assert (bad.failed, bad.numbers) == (True, "ValueError: no such thing")
     page = (tmp_path / "gallery.html").read_text()

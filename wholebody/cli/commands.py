@@ -105,7 +105,7 @@ You can copy and change the task file.""",
         "run the example scripts, and show them on one page",
         """\
 Run the packaged example scripts, and write one page that opens without a network. It has the picture of each, its
-story, what it printed, its code, and its scene to turn. All of them take some minutes.""",
+description, what it printed, its code, and its scene to turn. All of them take some minutes.""",
         text("names", "NAME", "which scripts (default: all)", nargs="*"),
         path("--out", "PAGE", "page (default: gallery.html)", default=Path("gallery.html")),
     )(later("pose.gallery")),

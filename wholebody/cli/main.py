@@ -101,7 +101,7 @@ def _say(message: str) -> None:
 
 
 def _discard_output() -> None:
-    """What is left to be written goes nowhere: Python would try again, and tell, when the process ends."""
+    """Remaining output goes nowhere: Python would try again, and tell, when the process ends."""
     with suppress(OSError, ValueError):  # a stdout of somebody else has no file
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

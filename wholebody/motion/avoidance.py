@@ -145,7 +145,7 @@ def avoid(
                 why = error.at_posture(f"near frame {int(np.argmin(away))}")
             result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {why}")
             seconds, report = time.perf_counter() - began, replace(judge.report(result, run), solved=False)
-        # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
+        # only answers that are free and held are smoothed; a new timing, or loads, would be others after it
         if report.rough and result.times is None and chosen.dynamics is None and not run.ended:
             from wholebody.motion.repair import smoothed  # it loads scipy.sparse
 

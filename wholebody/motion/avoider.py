@@ -1,13 +1,13 @@
 """The protocol of methods that free a clip: what each of them gets, and what it returns.
 
 `avoid` sets up one `Run`, has the method make postures of it, repairs what the method leaves to the shared repair, and
-judges the answer. So a method has no judge, repair or report of its own. `keep_back`, `kept_beside` and `followed` keep
-postures on one side of what the original motion passes through, which no rows of contact bring a limb out of.
+judges the answer. So a method has no judge, repair or report of its own. `keep_back` and `followed` keep postures on
+one side of what the original motion passes through, which no rows of contact bring a limb out of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -230,15 +230,6 @@ def keep_back(run: Run, q: Array, gap: int, first: int = 0, *, cancelled: Callab
                 q[begin : begin + len(found)] = found[::side]
                 return True
     return False
-
-
-def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Array:
-    """(n, nq) postures q of a window, on one side of what motions after frames `gaps` pass as far as that is found."""
-    q = np.array(q)
-    for gap in sorted(gaps):
-        if 0 <= gap < len(q) - 1:
-            keep_back(run, q, gap, window.first)
-    return q
 
 
 def followed(run: Run, window: Window, middle: int, begun: Array | None = None) -> Array:

@@ -24,7 +24,7 @@ class AvoidedCase:
 
     Attributes:
         clip, equipment, method: what was asked.
-        outcome: "free"; "left" where something is left; "refused" where the input is wrong; "ended" where its process
+        outcome: "free"; "left" where faults remain; "refused" where the input is wrong; "ended" where its process
             ended, which a further run does again.
         message: one sentence: the remaining faults, or why there is no clip.
         file: the clip, below the folder; empty where there is none.

@@ -70,7 +70,7 @@ def matched(
             f"no bones of the skeleton are known to belong to {figure.name} ({what}); name them in a TOML file with "
             "the tables [skeleton] and [figure]"
         )
-    asked = () if said and set(motion.names) <= set(found.values()) else ROLES  # no joint is left that could be named
+    asked = () if said and set(motion.names) <= set(found.values()) else ROLES  # every joint is named
     segments = _column("person_turn")
     segments = segments if set(segments.values()) <= set(figure.segments) else {}
     return Roles(

@@ -113,7 +113,7 @@ def lower(family: Family, first: Sequence[int] = ()) -> bool:
 
 
 def name_changes(family: Family) -> bool:
-    """Write into the later case of each jump that is left which joint turns, how far, and from where; see `lower`."""
+    """Write into the later case of each remaining jump which joint turns, how far, and from where; see `lower`."""
     order, done, compute, keep = family[:4]
     work = {(a, b): (b, done[a].q, done[b].q) for a, b in _neighbours(order) if _jumps(done, a, b)}
     largest: dict[int, tuple[float, str]] = {}

@@ -181,7 +181,7 @@ class ReachMap(Shown):
         return write(file, page.render(title=f"Reach of {self.frame}", facts=facts, first=first, images=images))
 
     def _heat(self) -> Array:
-        """(nx, ny, nz) minus the distance that is left, metres; where reached, 1 for the least measure to 0."""
+        """(nx, ny, nz) minus the remaining distance, metres; where reached, 1 for the least measure to 0."""
         values: Array = -np.asarray(self.left, dtype=float)
         reached = self.reached
         if reached.any():

@@ -53,8 +53,8 @@ class SolveRecord:
         message: one sentence that explains the outcome.
         seconds: of the solve, by the clock.
         iterations: of the method.
-        goal_error: largest distance that is left, metres.
-        goal_angle: largest angle that is left, radians.
+        goal_error: largest remaining distance, metres.
+        goal_angle: largest remaining angle, radians.
         penetration: depth of the deepest overlap, metres.
         clearance_violation: largest shortfall of a pair from its required distance, metres.
         limit_violation: largest violation of a joint limit, radians or metres.
@@ -189,7 +189,7 @@ class Records(Shown, Sequence[SolveRecord]):
         """Draw the outcomes as a table, a matplotlib figure.
 
         Targets are columns, people and layouts are rows; without factors each record is a row. A cell has the colour of
-        its outcome, and where it is not solved the distance that is left, in millimetres.
+        its outcome, and where it is not solved the remaining distance, in millimetres.
 
         Raises:
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an

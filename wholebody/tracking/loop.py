@@ -284,7 +284,7 @@ def follow(
         rigid: whether the figure is displaced as a whole, see `FrameLoop`.
         progress: called after each frame with the number of frames done.
         moves: thing to its placement at the end of each frame, as many as the track has; it moves from one to the next,
-            and begins where the scene has it. The scene is left as it was.
+            and begins where the scene has it. The scene is not changed.
 
     Raises:
         UnknownNameError, InputError: the track is of another figure, or no posture near its start is free.

@@ -1,4 +1,4 @@
-"""A gallery: example scripts, each run anew, on one page with picture, story, code, numbers and a scene to turn."""
+"""A gallery: example scripts, each run anew, on one page with picture, docstring, code, numbers and a scene to turn."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Exhibit(NamedTuple):
     """What one script made."""
 
     name: str  # of the script
-    story: str  # its docstring
+    about: str  # its docstring
     code: str  # its text, without the docstring
     numbers: str  # what it printed, without the paths of its files
     seconds: float  # that it ran
@@ -51,13 +51,13 @@ def exhibit(script: Path) -> Exhibit:
         pages, pictures = sorted(folder.rglob("*.html")), folder.rglob("*.png")
         return Exhibit(
             name=script.stem,
-            story=ast.get_docstring(module) or "",
+            about=ast.get_docstring(module) or "",
             code="\n".join(text.splitlines()[after:]).strip(),
             numbers="\n".join(line for line in said.splitlines() if str(folder) not in line),
             seconds=time.perf_counter() - began,
             pictures=tuple(
                 base64.b64encode(file.read_bytes()).decode("ascii")
-                for file in sorted(pictures, key=lambda file: file.stat().st_mtime_ns)  # in the order of the story
+                for file in sorted(pictures, key=lambda file: file.stat().st_mtime_ns)  # in the order of the script
             ),
             scene=pages[0].read_text("utf-8") if pages else "",
             failed=failed,

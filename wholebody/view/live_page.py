@@ -159,7 +159,7 @@ class LivePage:
                     offset = self.drag.place(name) - np.array(event.start_position)
                 self._target = np.array(event.end_position) + offset
                 if event.phase == "end" and isinstance(self.drag, LiveWorld):
-                    self.drag.let_go()  # what was thrown flies on
+                    self.drag.let_go()  # it keeps its velocity
                     self._target = None
                 elif event.phase == "end":
                     self._settling = SETTLING

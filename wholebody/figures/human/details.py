@@ -95,7 +95,7 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     start, end = (front, wide, -0.12 * thigh), (front, inwards(wide), -0.42 * thigh)
     yield with_values(_between(f"{name}:{SPREAD}", name, flesh, start, end), flesh=True)
     # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
-    # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
+    # to 41 mm from the small woman to the large man (estimate). These are tested against the remaining core.
     # Who sits as measured meets neither: there a large belly, and thighs broad for the hips, press them flatter.
     beside = sign * hip + inwards(out)
     free = min(_under_belly(size, (front, beside, 0.3 * thigh)), abs(beside)) - person.clothing

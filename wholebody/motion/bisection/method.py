@@ -56,7 +56,7 @@ class Bisection(Checked):
             ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.methods.QP(solver="daqp")`. "qp" is
-            `wb.methods.QP(restarts=0, iterations=50)`, ended after 25 programs where another start or way is left: a
+            `wb.methods.QP(restarts=0, iterations=50)`, ended after 25 programs where another start remains: a
             free root too is let go where no start frees a frame in so many.
 
     Raises:

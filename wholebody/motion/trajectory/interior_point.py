@@ -92,7 +92,7 @@ def _iterated(program: BandedQP, accuracy: float, gap: float) -> Answer:
             and mu * count <= gap * max(1.0, abs(float(z @ (0.5 * Pz + c))))
         ):
             return Answer(z, True, iteration)
-        # where a multiplier is more than 1e25 times its slack, rounding is all that is left
+        # where a multiplier is more than 1e25 times its slack, only rounding remains
         factor = matrices.factor(*bounds.diagonals(y / s)) if (y < 1e25 * s).all() else None
         if factor is None:
             break

@@ -246,19 +246,8 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
     near = 0.3 * step.radius
     fast, slow = np.minimum(0.5 * fastest, fastest - near), np.maximum(0.5 * slowest, slowest + near)
     frame, dof = np.nonzero((change > fast) | (change < slow))
-    now, low, high = change[frame, dof], slowest[frame, dof], fastest[frame, dof]
-    share = _brought_back(x, change - np.clip(change, slowest, fastest), step.radius)[dof]
-    low = np.where(now < low, now + share * (low - now), low)
-    high = np.where(now > high, now + share * (high - now), high)
+    low, high = slowest[frame, dof], fastest[frame, dof]
     index = np.arange(len(frame))
     values = np.concatenate([np.ones(len(index)), -np.ones(len(index))])
     columns = np.concatenate([place[frame + 1, dof], place[frame, dof]])
     return sp.csr_matrix((values, (np.tile(index, 2), columns)), shape=(len(index), size)), low, high
-
-
-def _brought_back(x: Array, past: Array, radius: float) -> Array:
-    """(a,) share of what changes (n - 1, a) pass their bounds by that a step within the trust region can take back."""
-    # It can shift all later frames, or reduce every deviation by a share.
-    shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
-    shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
-    return np.asarray(np.maximum(shifted, shrunk))

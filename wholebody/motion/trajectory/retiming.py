@@ -101,5 +101,5 @@ def passed(b: Array, step: float) -> tuple[Array, float]:
 
 
 def allowance(frames: int, stretch: float) -> float:
-    """What is left of the largest factor when the duration is made a multiple of the time step; at least 1."""
+    """The largest factor when the duration is made a multiple of the time step; at least 1."""
     return max(1.0, stretch * (frames - 1) / frames)

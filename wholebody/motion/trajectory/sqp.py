@@ -80,7 +80,7 @@ class _Filter:
         self.radius = RADIUS if radius is None else radius
         self._largest = 0.5 if largest is None else largest
         # 1/m; it is raised tenfold where a step leaves more than half of a shortfall
-        self.penalty, self._little = 1e3, 0
+        self.penalty = 1e3
         self._entries: list[tuple[float, float]] = []
 
     def takes(self, there: _At, here: _At) -> bool:
@@ -91,28 +91,18 @@ class _Filter:
         known = [*self._entries, (0.99 * here.total, here.objective)]
         return all(there.total < total or there.objective < least - 1e-2 * there.total for total, least in known)
 
-    def accept(self, here: _At, there: _At, longest: float, small: bool) -> None:
+    def accept(self, here: _At, there: _At, longest: float) -> None:
         """Adapt to a step that was taken."""
         self._entries.append((0.99 * here.total, here.objective))
-        left = there.worst > MET and there.total > 0.5 * here.total
-        self._little = self._little + 1 if left and small else 0
-        if left and longest < 0.9 * self.radius:
+        if there.worst > MET and there.total > 0.5 * here.total and longest < 0.9 * self.radius:
             self.penalty = min(10.0 * self.penalty, HIGHEST)
-        if self._little >= 2:  # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
-            self.radius = 0.5 * min(self.radius, longest)
-        elif longest > 0.9 * self.radius and not self._little:
+        if longest > 0.9 * self.radius:
             self.radius = min(2.0 * self.radius, self._largest)
 
-    def refuse(self, here: _At, longest: float) -> bool:
-        """Adapt to a step that was not taken; whether there is another one to try."""
+    def refuse(self, longest: float) -> bool:
+        """Shorten steps after one that was not taken; whether there is another one to try."""
         self.radius = 0.5 * min(self.radius, longest)
-        if self.radius >= 1e-4:  # rad, m
-            return True
-        if here.worst <= MET or self.penalty >= HIGHEST:
-            return False
-        self.penalty, self.radius = min(10.0 * self.penalty, HIGHEST), 0.1 * RADIUS
-        self._entries.clear()
-        return True
+        return self.radius >= 1e-4  # rad, m
 
 
 class WindowProgram:
@@ -162,7 +152,7 @@ class WindowProgram:
             small = longest <= 2e-3 or gained <= 5e-3 * max(here.objective, 1e-9)
             taken = filter_.takes(there, here)
             if taken:
-                filter_.accept(here, there, longest, small)
+                filter_.accept(here, there, longest)
                 multipliers = [
                     np.clip(old + one.equal, -0.05, 0.05) for old, one in zip(multipliers, there.rows, strict=True)
                 ]
@@ -170,7 +160,7 @@ class WindowProgram:
                 counts = counts | more | self._counts(here)
             if here.worst <= MET and small and not (more & ~counts).any():
                 break  # what another step could bring is less still
-            if not taken and not filter_.refuse(here, longest):
+            if not taken and not filter_.refuse(longest):
                 break
         return SQPResult(here.x, here.objective, here.worst, programs)
 

@@ -18,7 +18,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import millimetres
 from wholebody.geometry.continuous.swept_depth import Depths
-from wholebody.motion.avoider import Run, followed, kept_beside
+from wholebody.motion.avoider import Run, followed
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, deepest_shares, dipping
 from wholebody.motion.measures import jerk_ratio
@@ -202,7 +202,7 @@ class ClipRun:
         return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; kept on one side; followed from the deepest frame and both ends."""
+        """Deviations (n, nv) to begin with: none; followed from the deepest frame and from both ends."""
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         movable, goes_on = bool((own.limits.lower < own.limits.upper).any()), self._goes_on(own)
         if movable and goes_on:  # others are seldom on the side of things that it is on
@@ -210,10 +210,6 @@ class ClipRun:
         yield none
         if not movable:
             return
-        if own.always:
-            x = own.deviations(kept_beside(self._run, window, own.chart.original, own.always))
-            if x.any():
-                yield x
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
             if not (goes_on and middle == window.first):

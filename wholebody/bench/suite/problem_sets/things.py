@@ -121,7 +121,7 @@ def add_things(
                 break
         else:
             raise InputError(
-                f"no place is left for thing {number} of {count} around {scene.figure.name!r}; ask for fewer of them "
+                f"there is no place for thing {number} of {count} around {scene.figure.name!r}; ask for fewer of them "
                 "or less room"
             )
         scene.add(shape, name=f"{kind} {number}", at=at)
