@@ -25,7 +25,7 @@ from wholebody.methods.base import (
     UnsupportedTermError,
     check_problem,
 )
-from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
+from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions_of, in_words, proven
 from wholebody.methods.control import LONGEST, Control, Progress, errors_left
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -73,12 +73,10 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
     if control.undefined is not None:
         control.undefined = problem.placed(control.undefined)
         ending = with_values(ending, settled=False, unit="postures where all terms are finite")
-    status = _status(judgement, ending, enough, bool(control.reason))
-    if ending.contradictions is None:
-        why = "" if status == "solved" else explanation(problem)
-    else:
-        holds = judgement.holds(enough)
-        status, why = proven(status, ending.contradictions, holds), in_words(ending.contradictions)
+    status, found = _status(judgement, ending, enough, bool(control.reason)), ending.contradictions
+    if found is None:
+        found = () if status == "solved" else contradictions_of(problem)
+    status, why = proven(status, found, judgement.holds(enough)), in_words(found)
     caveat = f"this method leaves out {either(ending.left_out, 'and')}" if ending.left_out else ""
     if why and caveat and not judgement.holds(enough):
         why += f"; {caveat}"
@@ -99,7 +97,7 @@ def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool)
         return "infeasible" if settled or ending.failure else "stalled"
     if judgement.met(enough):
         return "solved"
-    return "unreachable" if settled else "stalled"
+    return "unreachable" if settled and judgement.first_order.nearer >= 1.0 / NEAREST else "stalled"
 
 
 def _message(problem: Problem, status: Status, judgement: Assessment, ending: Ending, enough: float) -> str:
@@ -111,7 +109,8 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     if status == "unreachable":
         return f"{ending.unreached}: nothing is violated, {left}"
     if judgement.holds(enough):
-        return f"ran out of {ending.unit}: {left}"
+        why = "stopped short of the nearest posture" if ending.settled else f"ran out of {ending.unit}"
+        return f"{why}: {left}"
     name, missed = _worst(problem, judgement, ending.q)
     why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     if (CONTACTS if name == PAIR else name) in ending.left_out:

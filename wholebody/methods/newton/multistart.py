@@ -110,11 +110,9 @@ class NewtonMultistart(Multistart[SearchResult]):
     def _ending(self) -> Ending:
         """The best result as the end of the search."""
         found = self.best
-        # steps that gain little end it far from a minimum too, as joints that follow others make them
-        ended = found.reached.stationary and found.judgement.optimality <= STARTS.optimal
         return Ending(
             found.q,
-            ended or (found.reached.stationary and not found.judgement.holds(self.settings.assessed_tolerance)),
+            found.reached.stationary,
             self.iterations,
             tuple(TraceEntry(error, 0.0, 0.0, 0.0) for error in self.residuals),
             f"in {self.iterations} iterations{self.how}",

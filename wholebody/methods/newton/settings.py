@@ -87,7 +87,6 @@ class Starts(NamedTuple):
     longest: float = 20.0  # s of processor time: several times what these take
     # of the time limit for other starts: the last iteration, towards the least violation, takes time too
     time_share: float = 0.5
-    optimal: float = 1e-3  # m, rad: first-order optimality from which on a missed goal is no minimum, but a stall
     alike: float = 1e-5  # relative difference of goal errors up to which two results count as equally near
 
 
