@@ -66,6 +66,18 @@ def test_two_arms_that_hold_one_bar_keep_it_where_it_is_in_both() -> None:
     assert np.abs(np.array(between) - apart).max() < 2e-4
 
 
+@pytest.mark.parametrize("place", [(0.14, 0.37, 1.02), (0.54, 0.07, 0.5), (0.56, -0.35, 0.64)])
+def test_what_the_trunk_reaches_is_not_called_unreachable_where_an_arm_alone_stops(
+    human: wb.Figure, place: tuple[float, float, float]
+) -> None:
+    scene = wb.Scene(human).add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(scene, goals=[wb.Point("right_palm", place)], constraints=[wb.Freeze("root")])
+    assert wb.solve(problem).solved
+    solution = wb.solve(problem, "ccd")
+    assert solution.status == "stalled"
+    assert solution.message.startswith("stopped short of the nearest posture")
+
+
 def test_a_hand_at_a_point_turns_for_the_one_that_is_to_meet_it() -> None:
     figure, rng, solved = wb.load("avatar"), np.random.default_rng(3), 0
     scene, arms = wb.Scene(figure), figure.dofs([*figure.groups["left_arm"], *figure.groups["right_arm"]])
