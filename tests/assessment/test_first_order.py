@@ -171,3 +171,14 @@ def test_constraints_are_called_as_they_were_given():
     assert "constraints[0]" not in solution.message
     problem.constraints = problem.constraints[:1]
     assert problem.constraint_names == ("constraints[1], Hold('left_foot')",)
+
+
+def test_how_much_nearer_goals_may_come_is_known_of_a_rod(planar_arm):
+    """The end of a rod of 1 m along x moves along y: of an error (1, -1) it leaves one part."""
+    problem = wb.Problem(wb.Scene(planar_arm((1.0,))), goals=[wb.Point("tip", (0.0, 1.0, 0.0))])
+    assert wb.assess(problem, np.zeros(1)).first_order.nearer == pytest.approx(np.sqrt(0.5))
+    beyond = wb.Problem(problem.scene, goals=[wb.Point("tip", (3.0, 0.0, 0.0))])
+    assert wb.assess(beyond, np.zeros(1)).first_order.nearer == 1.0
+    stopped = wb.Scene(planar_arm((1.0,), limit=0.5))
+    ahead = wb.Problem(stopped, goals=[wb.Point("tip", (0.0, 1.0, 0.0))])
+    assert wb.assess(ahead, np.array([0.5])).first_order.nearer == 1.0

@@ -233,7 +233,8 @@ def test_a_robot_has_the_ends_of_its_chains_in_an_assembly_and_beside_a_person(r
     beside = LiveDrag(wb.Problem(wb.Scene({"anna": wb.load("avatar"), "arm": (arm, (1.5, 0, 0))})))
     assert ends < set(beside.handles)
     assert "anna/right_palm" in beside.handles
-    assert not any("spine" in name for name in beside.handles)
+    assert {"anna/left_index_tip", "anna/right_index_tip"} <= set(beside.handles)  # to push and point with
+    assert not any("spine" in name or "toe" in name for name in beside.handles)
     before = alone.place("arm/grip")
     along(alone, "arm/grip", (0.0, 0.02, 0.0), 10)
     np.testing.assert_allclose(alone.place("arm/grip"), before + (0.0, 0.02, 0.0), atol=2e-3)

@@ -94,6 +94,27 @@ class FirstOrder:
         return float(np.abs(self.residual).max(initial=0.0))
 
     @cached_property
+    def nearer(self) -> float:
+        """The share of its goals' errors that a posture would leave that moves along what nothing balances.
+
+        Errors are linear in the motion, which turns no joint by more than a radian. It is 1 at a minimum.
+        """
+        with self._lent() as state:
+            rows = [values_and_rows(goal, goal.error, state) for goal in self._asked.goals]
+            roots = [np.sqrt(goal.weight) for goal in self._asked.goals]
+            error = np.concatenate([np.zeros(1), *(root * each for root, (each, _) in zip(roots, rows, strict=True))])
+            pull = sum((root * each @ (root * jacobian) for root, (each, jacobian) in zip(roots, rows, strict=True)))
+            active = _active(self._asked, state, self._near)
+            _, way = _balanced(pull, active.signed, active.one_sided)
+            led = [root * jacobian @ way for root, (_, jacobian) in zip(roots, rows, strict=True)]
+        led = np.concatenate([np.zeros(1), *led])
+        bends = float(led @ led)
+        if not bends or np.linalg.norm(way) <= INDEPENDENT * np.linalg.norm(pull):  # what rounding leaves
+            return 1.0
+        length = min(float(error @ led) / bends, 1.0 / float(np.abs(way).max()))
+        return float(np.linalg.norm(error - length * led) / np.linalg.norm(error))
+
+    @cached_property
     def blockers(self) -> tuple[Blocker, ...]:
         """See `Assessment`."""
         with self._lent() as state:

@@ -150,6 +150,8 @@ class Articulated:
         figure, impulses = (self.q, self.velocity, self._old), self.impulses.copy()
         back = None if self._engine is None else self._engine.way_back()
         most, again = min(STEP, time) if self._turning * time > FAR else time, False
+        if back is None and self._turning * most > FAR and self._stops > 0:  # as limbs turned in the last step
+            self._stops, most = self._stops - 1, max(0.5 * SHORTEST, 0.14 / self._turning)
         while True:
             done, frame, sunk = self._attempt(most, time, aim, steady, moved, segments)
             met = [] if frame is None else [event.time for event in impacts(frame.events, segments, BOUNCE)]

@@ -25,7 +25,7 @@ from wholebody.methods.base import (
     UnsupportedTermError,
     check_problem,
 )
-from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
+from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions_of, in_words, proven
 from wholebody.methods.control import LONGEST, Control, Progress, errors_left
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -33,7 +33,6 @@ from wholebody.solution import Solution, Status, TraceEntry
 from wholebody.tasks.balance import Balance
 
 PAIR = "the clearance of a pair"  # in messages
-OPTIMAL = 1e-3  # m, rad: first-order optimality from which on a missed goal is at no minimum: such a search stalled
 
 
 class Ending(NamedTuple):
@@ -53,7 +52,7 @@ class Ending(NamedTuple):
     # number of quadratic programs that each solver closed; empty for a method without programs
     programs: Mapping[str, int] = MappingProxyType({})
     method: str = ""  # what was run, where that says more than the method's name
-    unreached: str = ""  # what the search knows of goals that are missed, beyond where it ended
+    unreached: str = "not reachable from here"  # what the search knows of goals that are missed
 
 
 def assessed_tolerance(tolerance: float) -> float:
@@ -74,12 +73,10 @@ def concluded(problem: Problem, ending: Ending, *, method: str, tolerance: float
     if control.undefined is not None:
         control.undefined = problem.placed(control.undefined)
         ending = with_values(ending, settled=False, unit="postures where all terms are finite")
-    status = _status(judgement, ending, enough, bool(control.reason))
-    if ending.contradictions is None:
-        why = "" if status == "solved" else explanation(problem)
-    else:
-        holds = judgement.holds(enough)
-        status, why = proven(status, ending.contradictions, holds), in_words(ending.contradictions)
+    status, found = _status(judgement, ending, enough, bool(control.reason)), ending.contradictions
+    if found is None:
+        found = () if status == "solved" else contradictions_of(problem)
+    status, why = proven(status, found, judgement.holds(enough)), in_words(found)
     caveat = f"this method leaves out {either(ending.left_out, 'and')}" if ending.left_out else ""
     if why and caveat and not judgement.holds(enough):
         why += f"; {caveat}"
@@ -100,9 +97,7 @@ def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool)
         return "infeasible" if settled or ending.failure else "stalled"
     if judgement.met(enough):
         return "solved"
-    # steps that gain little, or along one joint at a time, end far from a minimum too
-    minimum = bool(ending.unreached) or judgement.optimality <= OPTIMAL
-    return "unreachable" if settled and minimum else "stalled"
+    return "unreachable" if settled and judgement.first_order.nearer >= 1.0 / NEAREST else "stalled"
 
 
 def _message(problem: Problem, status: Status, judgement: Assessment, ending: Ending, enough: float) -> str:
@@ -112,9 +107,10 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     if ending.failure:
         return f"{ending.failure}: {left}"
     if status == "unreachable":
-        return f"{ending.unreached or 'not reachable from here'}: nothing is violated, {left}"
+        return f"{ending.unreached}: nothing is violated, {left}"
     if judgement.holds(enough):
-        return f"{'stopped before the closest posture' if ending.settled else f'ran out of {ending.unit}'}: {left}"
+        why = "stopped short of the closest posture" if ending.settled else f"ran out of {ending.unit}"
+        return f"{why}: {left}"
     name, missed = _worst(problem, judgement, ending.q)
     why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     if (CONTACTS if name == PAIR else name) in ending.left_out:

@@ -359,7 +359,7 @@ def proven(status: Status, found: tuple[Contradiction, ...], holds: bool) -> Sta
     return status
 
 
-def explanation(problem: Problem) -> str:
-    """One sentence about the contradictions of a problem; empty if there are none."""
+def contradictions_of(problem: Problem) -> tuple[Contradiction, ...]:
+    """The contradictions of a problem, in a workspace of its own."""
     with problem.borrow() as workspace:
-        return in_words(contradictions(problem, workspace))
+        return contradictions(problem, workspace)

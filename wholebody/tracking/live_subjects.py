@@ -53,11 +53,13 @@ def handle_frames(frames: Collection[str]) -> list[str]:
 
 
 def handles_of(figure: Figure) -> list[str]:
-    """`handle_frames` of people, and the ends of the chains of other figures, such as robots and a hand's fingers."""
+    """`handle_frames`, the fingertips of people, and the ends of the chains of other figures, such as robots."""
     names = handle_frames({*figure.frames, *figure.segments})
     people = {name.rpartition("/")[0] for name in names if name.endswith("pelvis")}
     ends = [chain.tip for chain in figure.chains.values()] or figure.segments[-1:]
-    return list(dict.fromkeys([*names, *(name for name in ends if name.rpartition("/")[0] not in people)]))
+    fingers = [name for name in ends if name.endswith("_tip") and not name.endswith("_toe_tip")]
+    others = [name for name in ends if name.rpartition("/")[0] not in people]
+    return list(dict.fromkeys([*names, *fingers, *others]))
 
 
 class LiveProblem:

@@ -84,7 +84,7 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
         return solution
     judgement = assess(problem.with_start(q), q)
     message = "the posture that was found lies beyond something in the way; the figure stays"
-    return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
+    return replace(solution, q=q, status="stalled", assessment=judgement, message=message)
 
 
 def _passes_through(problem: Problem, before: Array, after: Array) -> bool:

@@ -161,3 +161,34 @@ def test_a_person_holds_a_box_where_a_measure_of_her_own_is_least() -> None:
     assert stated.value(scene.state(made.posture("ann"))) < 0.01 * before
     ends = [made.placement(name).translation for name in ("ann/left_palm", "ann/right_palm")]
     assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(0.2, abs=2e-5)
+
+
+class Low(wb.Measure):
+    """The height of a body."""
+
+    def __init__(self, body: str) -> None:
+        self.body = body
+
+    def value(self, state: Any) -> float:
+        return float(state.data.oMi[state.model.getJointId(self.body)].translation[2])
+
+    def gradient(self, state: Any) -> np.ndarray:
+        joint, gradient = state.model.getJointId(self.body), np.zeros(state.model.nv)
+        first = state.model.joints[joint].idx_v
+        gradient[first : first + 3] = state.data.oMi[joint].rotation[2]
+        return gradient
+
+
+@pytest.mark.parametrize("iterations", [200, 5])
+def test_a_chain_hangs_straight_down_or_the_answer_says_that_it_does_not_yet(iterations: int) -> None:
+    made, at, turned = wb.Assembly(), np.zeros(3), 0.0
+    for k, angle in enumerate(np.random.default_rng(1).uniform(-1.0, 1.0, 8)):
+        turned += angle
+        made.body(f"rod {k}", (*at, 0.0, np.sin(0.5 * turned), 0.0, np.cos(0.5 * turned)))
+        at = at + 0.3 * np.array([np.sin(turned), 0.0, np.cos(turned)])
+        before = f"rod {k - 1}" if k else "world"
+        made.revolute(before, f"rod {k}", at_first=(0, 0, 0.3 * bool(k)), at_second=(0, 0, 0), axis=(0, 1, 0),
+                      axis_second=(0, 1, 0))  # fmt: skip
+    answer = made.minimise(Low("rod 7")).solve(iterations=iterations)
+    hangs = answer.placements["rod 7"].translation[2] < -7 * 0.3 + 1e-4
+    assert hangs == (iterations == 200) == ("not lowered to a minimum" not in answer.message)

@@ -225,7 +225,7 @@ class Assembly(AssemblyJoints):
 
         Args:
             tolerance: metres and radians, from 1e-12.
-            iterations: most Newton iterations, and most rounds that look for the nearest placements.
+            iterations: most Newton iterations, and most rounds that lower measures or look for the nearest placements.
             algebra: "auto", "normal", "kkt" or "schur".
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
@@ -248,8 +248,9 @@ class Assembly(AssemblyJoints):
             if nearest and found.met:
                 x, _, converged = refine(active, x, tolerance, iterations, anchor=start)
                 remark = "" if converged else "; the nearest placements were not reached: give more iterations"
-            elif found.met:
-                x = active.lowered(x, tolerance)
+            elif found.met and active.objective is not None:
+                x, _, converged = refine(active, x, tolerance, iterations)
+                remark = "" if converged else "; the measures were not lowered to a minimum: give more iterations"
             self._places = list(x.reshape(-1, 7))
             status, message = explained(active.system, x, found, tolerance)
             joint_error, goal_error = active.system.largest_errors(active.system.residual(x))
@@ -305,7 +306,7 @@ class Assembly(AssemblyJoints):
         )  # fmt: skip
         holds = found.hard <= max(10.0 * FRAMES.hard_tolerance, before)
         taken = holds
-        x = active.lowered(found.x, FRAMES.hard_tolerance, rounds=1) if found.met else found.x
+        x = active.lowered(found.x, FRAMES.hard_tolerance) if found.met else found.x
         if holds and active.contacts is not None:
             ends = self._to_scene(start), self._to_scene(x)
             taken = is_free(active.workspace, *ends, SHORT, budget_for_sweep())

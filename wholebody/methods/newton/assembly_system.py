@@ -18,7 +18,6 @@ from wholebody.methods.newton.assembly_geometry import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, EquationSet, Role
 from wholebody.methods.newton.feasibility import FeasibilityResult
 from wholebody.methods.newton.measures import Objective, refine
-from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.scene import Scene
@@ -183,9 +182,9 @@ class AssemblySystem(ActiveSystem):
         """The posture (nq,) of the scene at the variables (7 n,)."""
         return self._to_scene(x)
 
-    def lowered(self, x: Array, tolerance: float, rounds: int = REFINEMENT.rounds) -> Array:
-        """The variables (7 n,) after rounds that lower the measures along the equations, which hold at x."""
-        return x if self.objective is None else refine(self, x, tolerance, rounds).x
+    def lowered(self, x: Array, tolerance: float) -> Array:
+        """The variables (7 n,) after a round that lowers the measures along the equations, which hold at x."""
+        return x if self.objective is None else refine(self, x, tolerance, 1).x
 
     def _projected(self, x: Array) -> Array:
         x = unit(x)
