@@ -7,6 +7,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.state import State
+from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.measures import foot_sliding
 from wholebody.motion.stance import held_feet, standing
 
@@ -34,6 +35,22 @@ def test_a_foot_that_swings_does_not_stand(avatar: wb.Figure) -> None:
         assert found[f"left_{point}"][:8].all()
         assert found[f"left_{point}"][22:].all()
         assert not found[f"left_{point}"][11:19].any()
+
+
+def test_feet_that_are_named_are_the_only_ones(avatar: wb.Figure) -> None:
+    found = standing(avatar, kicking(avatar), 1 / 30, wb.motion.StanceFeet(["right_ball"]))
+    assert set(found) == {"right_ball"}
+    assert found["right_ball"].all()
+
+
+def test_a_frozen_joint_that_moves_is_missed_by_its_turn(avatar: wb.Figure) -> None:
+    q = kicking(avatar)[:1]
+    terms = frame_terms(wb.Scene(avatar), q, 1 / 30, [wb.Freeze("left_knee_flexion")])
+    moved = avatar.with_joints(q[0], {"left_knee_flexion": 0.2 + avatar.joint_values(q[0])["left_knee_flexion"]})
+    miss = terms.worst(0, State(avatar.model).update(moved))
+    assert miss.by == pytest.approx(0.2, abs=1e-12)
+    assert "Freeze" in miss.name
+    assert terms.worst(0, State(avatar.model).update(q[0])).by == 0.0
 
 
 def test_a_foot_that_glides_slowly_does_not_stand(avatar: wb.Figure) -> None:

@@ -125,6 +125,14 @@ def test_a_group_is_widened_by_a_share_of_its_frames() -> None:
     assert (group.first, group.last) == (20, 25)  # a key at 19 stays
 
 
+def test_a_short_group_is_widened_to_the_least_where_there_is_room() -> None:
+    bad = np.zeros(20, dtype=bool)
+    bad[10] = True
+    for low, high, frames in ((0, 19, (8, 12)), (9, 19, (10, 14)), (0, 11, (6, 10)), (8, 12, (9, 11))):
+        (group,) = collision_groups(bad, low, high, 0.0, 5)
+        assert (group.first, group.last) == frames
+
+
 def test_groups_whose_buffers_meet_are_one() -> None:
     bad = np.zeros(30, dtype=bool)
     bad[[5, 6, 9, 10]] = True
