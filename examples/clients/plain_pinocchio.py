@@ -125,6 +125,9 @@ def main(folder, out, *sets):
             if "frames" in problem:
                 answers.append(answer | {"refused": "goals that move are not followed"})
                 continue
+            if any("of" in balance for balance in problem["balance"]):
+                answers.append(answer | {"refused": "balance of some links is not expressed"})
+                continue
             q, seconds = solve(folder, problem, seed)
             answers.append(answer | {"posture": q.tolist(), "seconds": seconds})
     content = {"format": "wholebody answers", "version": "1.0", "method": "plain Pinocchio", "answers": answers}

@@ -110,6 +110,13 @@ class Assessment:
         return all(error <= tolerance for error in (self.goal_error, self.goal_angle, *self.goal_errors))
 
     @property
+    def nearest(self) -> bool:
+        """Whether to first order no motion that is free leaves less than 98 % of the goals' errors."""
+        return (
+            self.first_order.nearer >= 0.98
+        )  # of true minima 0.995 or more, where a method stopped short 0.95 or less
+
+    @property
     def in_the_way(self) -> str:
         """The strongest blockers in words, to append to a sentence; empty if goals are met and everything holds."""
         if not self.blockers:

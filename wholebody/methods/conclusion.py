@@ -25,7 +25,7 @@ from wholebody.methods.base import (
     UnsupportedTermError,
     check_problem,
 )
-from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions_of, in_words, proven
+from wholebody.methods.contradictions import Contradiction, contradictions_of, in_words, proven
 from wholebody.methods.control import LONGEST, Control, Progress, errors_left
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
@@ -97,7 +97,7 @@ def _status(judgement: Assessment, ending: Ending, enough: float, stopped: bool)
         return "infeasible" if settled or ending.failure else "stalled"
     if judgement.met(enough):
         return "solved"
-    return "unreachable" if settled and judgement.first_order.nearer >= 1.0 / NEAREST else "stalled"
+    return "unreachable" if settled and judgement.nearest else "stalled"
 
 
 def _message(problem: Problem, status: Status, judgement: Assessment, ending: Ending, enough: float) -> str:

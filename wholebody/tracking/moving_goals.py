@@ -16,7 +16,7 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.base import Tracker, check_problem
 from wholebody.problem import Problem
-from wholebody.solution import Solution
+from wholebody.solution import Solution, Status
 from wholebody.tasks import Frame, Orientation, Point, Relative
 from wholebody.tasks.base import Goal
 
@@ -84,7 +84,8 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
         return solution
     judgement = assess(problem.with_start(q), q)
     message = "the posture that was found lies beyond something in the way; the figure stays"
-    return replace(solution, q=q, status="stalled", assessment=judgement, message=message)
+    status: Status = "unreachable" if judgement.nearest else "stalled"
+    return replace(solution, q=q, status=status, assessment=judgement, message=message)
 
 
 def _passes_through(problem: Problem, before: Array, after: Array) -> bool:

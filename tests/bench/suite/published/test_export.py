@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -210,17 +211,24 @@ def figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+def model_order(figure: wb.Figure) -> dict[str, int]:
+    """Where in a posture each coordinate of the files is."""
+    where: dict[str, int] = {}
+    for name, joint in zip(list(figure.model.names)[1:], list(figure.model.joints)[1:], strict=True):
+        places = ("x", "y", "z", "qx", "qy", "qz", "qw")
+        named = [name] if joint.nq == 1 else [f"{name} {place}" for place in places]
+        where |= {one: joint.idx_q + k for k, one in enumerate(named)}
+    return where
+
+
 @pytest.mark.parametrize("number", range(3))
 def test_several_figures_are_one_body_of_which_free_roots_float(figures: Path, number: int) -> None:
     """The files, read by Pinocchio and coal alone, are judged as the package judges the scene."""
     case, rebuilt = problem_set("two_figures").make(number, SEED), Rebuilt(figures, f"two_figures/{number:04d}")
     body = json.loads((figures / rebuilt.content["body"]).read_text())
     check(body, schema := json.loads((figures / "body.schema.json").read_text()), schema, "body")
-    figure, problem, places = case.problem.scene.figure, case.problem, ("x", "y", "z", "qx", "qy", "qz", "qw")
-    where: dict[str, int] = {}
-    for name, joint in zip(list(figure.model.names)[1:], list(figure.model.joints)[1:], strict=True):
-        named = [name] if joint.nq == 1 else [f"{name} {place}" for place in places]
-        where |= {one: joint.idx_q + k for k, one in enumerate(named)}
+    figure, problem = case.problem.scene.figure, case.problem
+    where = model_order(figure)
     assert set(where) == set(body["coordinates"])
     assert len(body["root_effort_weights"]) == 6 * len(figure.roots) == 6 * (2, 0, 1)[number]
     order, rng = [where[name] for name in body["coordinates"]], np.random.default_rng(5)
@@ -235,10 +243,24 @@ def test_several_figures_are_one_body_of_which_free_roots_float(figures: Path, n
         assert found.effort == pytest.approx(effort.value(problem.scene.state(q)), rel=1e-9, abs=1e-12)
 
 
-def test_balance_of_one_of_several_has_no_word(figures: Path) -> None:
-    case = problem_set("two_figures").make(2, SEED)
-    feet = ["one/left_foot", "one/right_foot"]
-    case.problem.constraints = (*case.problem.constraints, wb.Balance(feet).resolve(case.problem.scene, case.witness))
-    body = body_files(case.problem.scene.figure, "both", {})
-    with pytest.raises(InputError, match="no word for Balance of one of several figures"):
-        problem_content(case, body, case.witness, {})
+def test_balance_of_one_of_several_is_that_of_its_links(figures: Path, tmp_path: Path) -> None:
+    case, name = problem_set("two_figures").make(2, SEED), "two_figures/0002"
+    figure, balance = case.problem.scene.figure, wb.Balance(["one/left_foot", "one/right_foot"])
+    stated = balance.resolve(case.problem.scene, case.witness)
+    case.problem.constraints = (*case.problem.constraints, stated)
+    shutil.copytree(figures, out := tmp_path / "out")
+    content = problem_content(case, body_files(figure, "both", {}), case.witness, {})
+    content["holds"], content["body"] = [], json.loads((out / "problems" / f"{name}.json").read_text())["body"]
+    check(content, schema := json.loads((out / "problem.schema.json").read_text()), schema, name)
+    (out / "problems" / f"{name}.json").write_text(json.dumps(content))
+    rebuilt = Rebuilt(out, name)
+    body = json.loads((out / content["body"]).read_text())
+    read = model_order(figure)
+    q = case.witness.copy()
+    q[read["one/root_joint x"]] += 0.3  # over feet that the balance takes for fixed
+    inside = stated.value(case.problem.scene.state(q))
+    missed = float(np.maximum(stated.lower - inside, 0.0).max())
+    assert missed > 0.01
+    order = [read[one] for one in body["coordinates"]]
+    assert rebuilt.score(q[order]).holds == pytest.approx(missed, abs=1e-9)
+    assert rebuilt.score(case.witness[order]).holds < 1e-6

@@ -51,7 +51,7 @@ def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> 
         "seeds": {"near": body.posture(problem.start), "far": body.posture(far)},
         "goals": [] if case.frames else [_goal(goal) for goal in problem.goals],
         "holds": [_hold(term) for term in problem.constraints if isinstance(term, wb.Hold)],
-        "balance": [_balance(term) for term in problem.constraints if isinstance(term, wb.Balance)],
+        "balance": [_balance(term, body.links) for term in problem.constraints if isinstance(term, wb.Balance)],
         "effort_from": body.posture(problem.start),
         "things": things,
         "untested": untested,
@@ -91,11 +91,10 @@ def _placed(frame: str, base: str | None, position: Array, rotation: Array | Non
     return {"type": "placement", "frame": frame, "in": base, "position": _listed(position), "quaternion": turn}
 
 
-def _balance(term: wb.Balance) -> dict[str, Any]:
-    """The centre of mass x fulfils `normals @ x[:2] - offsets >= margin`."""
-    if term.joints is not None:
-        raise InputError("the files have no word for Balance of one of several figures")
-    return {"normals": [_listed(row) for row in term.normals], "offsets": _listed(term.offsets), "margin": term.margin}
+def _balance(term: wb.Balance, links: Sequence[str]) -> dict[str, Any]:
+    """The centre of mass x of the body, or of those links `of` it, fulfils `normals @ x[:2] - offsets >= margin`."""
+    said = {"normals": [_listed(row) for row in term.normals], "offsets": _listed(term.offsets), "margin": term.margin}
+    return said if term.joints is None else {**said, "of": [links[joint] for joint in term.joints]}
 
 
 def _things(case: Case, body: BodyFiles, meshes: Meshes) -> tuple[list[dict[str, Any]], list[list[str]]]:

@@ -216,6 +216,10 @@ class Rebuilt:
 
     def _balance(self, balance: Mapping[str, Any], q: Array) -> Array:
         place = pin.centerOfMass(self.model, self._data, q)[:2]
+        if "of" in balance:
+            joints = [self.model.frames[self.model.getFrameId(link)].parentJoint for link in balance["of"]]
+            heavy = [(self.model.inertias[k].mass, self._data.oMi[k].act(self.model.inertias[k].lever)) for k in joints]
+            place = sum(mass * at[:2] for mass, at in heavy) / sum(mass for mass, _ in heavy)
         inside = np.array(balance["normals"]) @ place - np.array(balance["offsets"])
         return np.asarray(np.maximum(balance["margin"] - inside, 0.0))
 
