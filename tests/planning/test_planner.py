@@ -365,6 +365,28 @@ def test_a_path_of_a_turning_body_that_waves_among_nothing_is_drawn_straight(
     assert length(model, found) == pytest.approx(straight, rel=1e-3)
 
 
+def test_a_path_that_is_straight_is_tight_after_few_programs(
+    planar_arm: Callable[..., wb.Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rounding makes the foreseen length of some longer, and the same program came again until the time was over."""
+    figure, rng, asked = planar_arm((0.5, 0.5, 0.5)), np.random.default_rng(0), list[float]()
+
+    def counted(*of: Any) -> Any:
+        asked.append(of[-1])
+        assert len(asked) < 100
+        return programmed(*of)
+
+    monkeypatch.setattr("wholebody.planning.tightening.programmed", counted)
+    for _ in range(10):
+        ends = rng.uniform(-1.0, 1.0, (2, 3))
+        problem = wb.Problem(wb.Scene(figure), ends[0])
+        with problem.borrow() as workspace:
+            slides = TrackedMotions(problem, workspace)
+            found = tighten(figure.model, list(np.linspace(*ends, 5)), slides, slides)
+        assert length(figure.model, found) == pytest.approx(np.linalg.norm(ends[1] - ends[0]), rel=1e-6)
+    assert len(asked) <= 20
+
+
 def test_multipliers_are_those_of_the_complementarity_problem() -> None:
     """Forces and gaps are not negative, and one of the two is zero, which is so of one solution alone."""
     rng = np.random.default_rng(0)

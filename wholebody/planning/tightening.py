@@ -43,10 +43,9 @@ def tighten(model: pin.Model, path: list[Array], local: LocalPlanner, slides: Tr
     """A path drawn tight round things, to which few shortcuts lead as they go from one posture to another one."""
     band, damping = banded(model, path, local), DAMPING
     while len(band) > 2 and not BUDGET.over:
-        program = programmed(model, band, slides, damping)
-        if program is None:
+        program, before, better = programmed(model, band, slides, damping), length(model, band), 0.0
+        if program is None or not program.foreseen > 1e-6 * before:  # what foresees nothing would come again and again
             break
-        before, better = length(model, band), 0.0
         for _ in range(3):  # a part of displacements that make it longer, as some are cut, costs less than other ones
             moved, cut = _moved(model, band, program, (local, slides))
             better = before - length(model, moved)
