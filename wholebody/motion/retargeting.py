@@ -90,8 +90,9 @@ def retarget(
         where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
         touch it at the same place, and go with it; hands that meet do so. In every frame the figure is free of itself,
         of the ground and of things where the holds and limits leave room for it; between frames too, as seen at some
-        places of each motion, unless things move. Overlaps of 2 mm or more in frames, or in the middle between two, are
-        told. What `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
+        places of each motion, unless things move. Overlaps of 2 mm or more are told that are seen in frames, in the
+        middle between two, or at eighths between where one of 1 mm is near. What `wb.check` tells, `wb.avoid` mends.
+        With `ground=None` and no scene the figure may collide.
 
     Raises:
         UnknownNameError: a name that does not exist.
@@ -230,29 +231,29 @@ def _held(
 
 
 def _depths(fitter: Fitter, holds: Holds, q: Array) -> Array:
-    """How deep frames (n, nq), and middles of motions to the next, overlap (n, 2), metres."""
-    ways = [pin.interpolate(fitter.model, *ends, 0.5) for ends in pairwise(q)]
-    depths = np.zeros((len(q), 2))
+    """How deep frames (n, nq), and eighths of motions to the next where one is near, overlap (n, 8), m."""
+    depths = np.zeros((len(q), 8))
     for frame, posture in enumerate(q):
         fitter.see(holds.moved(frame))
         depths[frame, 0] = fitter.depth(posture)
-        if frame < len(ways) and not holds.moved(frame):
-            depths[frame, 1] = fitter.depth(ways[frame])
+    for frame, (before, after) in enumerate(pairwise(q)):
+        for part in () if holds.moved(frame) else (4, 2, 6, 1, 3, 5, 7):
+            if part == 4 or max(depths[frame].max(), depths[frame + 1, 0]) >= 0.5 * DEEP:
+                depths[frame, part] = fitter.depth(pin.interpolate(fitter.model, before, after, part / 8))
     return depths
 
 
 def _said_inside(fitter: Fitter, holds: Holds, q: Array, depths: Array) -> str:
-    """What is known of frames (n, nq), and middles of motions to the next, that overlap deeply; empty without one."""
-    worst, late = np.unravel_index(int(depths.argmax()), depths.shape)
+    """What is known of frames (n, nq), and motions to the next, that overlap deeply; empty without one."""
     if depths.max() < DEEP:
         return ""
+    worst, part = np.unravel_index(int(depths.argmax()), depths.shape)
     fitter.see(holds.moved(int(worst)))
-    deep = pin.interpolate(fitter.model, q[worst], q[worst + 1], 0.5) if late else q[worst]
-    first, second = fitter.deepest(deep)
+    first, second = fitter.deepest(pin.interpolate(fitter.model, *q[[worst, min(worst + 1, len(q) - 1)]], part / 8))
     return (
         f"{(depths.max(axis=1) >= DEEP).sum()} of {len(q)} frames, or motions to the next, overlap by "
         f"{1e3 * DEEP:.0f} mm or more, most of all {first} and {second} by {1e3 * depths.max():.0f} mm "
-        f"{'after' if late else 'in'} frame {worst}"
+        f"{'after' if part else 'in'} frame {worst}"
     )
 
 
