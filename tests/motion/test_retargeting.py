@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +14,9 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
+from wholebody.motion import retargeting
+from wholebody.motion.holds import Holds
+from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.roles import matched
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tasks import ReachCones
@@ -332,3 +337,32 @@ def test_limbs_that_swing_wildly_stay_in_their_cones(human: Figure) -> None:
     clip = wb.retarget(SkeletonMotion.moved(still.names, still.parents, still.offsets, local, root, dt), human)
     assert count == 5
     assert within(clip)
+
+
+def test_told_overlaps_are_looked_for_beside_the_middle_of_a_motion() -> None:
+    """2.1 mm a quarter after frame 1, 1.2 mm there and in the middle; the motion before meets it only at its end."""
+    asked = list[float]()
+
+    class Hinge:
+        model = pin.Model()
+
+        def see(self, _: object) -> None:
+            """Nothing moves."""
+
+        def depth(self, q: np.ndarray) -> float:
+            asked.append(float(q[0]))
+            return max(0.0, 2.1e-3 - 3.6e-3 * abs(asked[-1] - 1.25))
+
+        def deepest(self, q: np.ndarray) -> tuple[str, str]:
+            return f"part at {q[0]}", "floor"
+
+    Hinge.model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "hinge")
+    still = cast("Holds", SimpleNamespace(moved=lambda _: {}))
+    q, fitter = np.array([[0.0], [1.0], [2.0]]), cast("Fitter", Hinge())
+    depths = retargeting._depths(fitter, still, q)
+    assert depths.max() == pytest.approx(2.1e-3)
+    assert depths[1, 4] == pytest.approx(1.2e-3)
+    assert len([at for at in asked if 1.0 < at < 2.0]) == 7
+    told = retargeting._said_inside(fitter, still, q, depths)
+    assert "1 of 3 frames" in told
+    assert "part at 1.25 and floor by 2 mm after frame 1" in told

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -51,7 +52,6 @@ from wholebody.motion.touching import Touched
 from wholebody.scene.scene import Scene
 
 DEEP = 2e-3  # m: what overlaps by so much is told
-QUARTERS = 4  # at which motions between frames are looked at
 # a clip whose points jerk so many times as those of the free fit, and so much [m/s³], or that overlaps so, is beyond
 # what it should be; so many times beyond, it is stuck at an edge, and is sought once more with feet that lag so much.
 # Of both the one is kept with the least product of errors of bones and of how many times it is beyond
@@ -90,8 +90,9 @@ def retarget(
         where they came down, soles on the ground. Hands, elbows, knees and the pelvis that touch a thing of the scene
         touch it at the same place, and go with it; hands that meet do so. In every frame the figure is free of itself,
         of the ground and of things where the holds and limits leave room for it; between frames too, as seen at some
-        places of each motion, unless things move. Overlaps of 2 mm or more in frames, or at quarters between two, are
-        told. What `wb.check` tells of either, `wb.avoid` mends. With `ground=None` and no scene the figure may collide.
+        places of each motion, unless things move. Overlaps of 2 mm or more are told that are seen in frames, in the
+        middle between two, or at eighths between where one of 1 mm is near. What `wb.check` tells, `wb.avoid` mends.
+        With `ground=None` and no scene the figure may collide.
 
     Raises:
         UnknownNameError: a name that does not exist.
@@ -230,29 +231,30 @@ def _held(
 
 
 def _depths(fitter: Fitter, holds: Holds, q: Array) -> Array:
-    """How deep frames (n, nq), and motions to the next, overlap at quarters (n, 4), metres."""
-    depths = np.zeros((len(q), QUARTERS))
+    """How deep frames (n, nq), and eighths of motions to the next where one is near, overlap (n, 8), m."""
+    depths = np.zeros((len(q), 8))
     for frame, posture in enumerate(q):
         fitter.see(holds.moved(frame))
-        between = frame + 1 < len(q) and not holds.moved(frame)
-        for late in range(QUARTERS if between else 1):
-            there = pin.interpolate(fitter.model, posture, q[frame + 1], late / QUARTERS) if late else posture
-            depths[frame, late] = fitter.depth(there)
+        depths[frame, 0] = fitter.depth(posture)
+    for frame, (before, after) in enumerate(pairwise(q)):
+        fitter.see(moved := holds.moved(frame))
+        for part in () if moved else (4, 2, 6, 1, 3, 5, 7):
+            if part == 4 or max(depths[frame].max(), depths[frame + 1, 0]) >= 0.5 * DEEP:
+                depths[frame, part] = fitter.depth(pin.interpolate(fitter.model, before, after, part / 8))
     return depths
 
 
 def _said_inside(fitter: Fitter, holds: Holds, q: Array, depths: Array) -> str:
     """What is known of frames (n, nq), and motions to the next, that overlap deeply; empty without one."""
-    worst, late = np.unravel_index(int(depths.argmax()), depths.shape)
     if depths.max() < DEEP:
         return ""
+    worst, part = np.unravel_index(int(depths.argmax()), depths.shape)
     fitter.see(holds.moved(int(worst)))
-    deep = pin.interpolate(fitter.model, q[worst], q[worst + 1], late / QUARTERS) if late else q[worst]
-    first, second = fitter.deepest(deep)
+    first, second = fitter.deepest(pin.interpolate(fitter.model, *q[[worst, min(worst + 1, len(q) - 1)]], part / 8))
     return (
         f"{(depths.max(axis=1) >= DEEP).sum()} of {len(q)} frames, or motions to the next, overlap by "
         f"{1e3 * DEEP:.0f} mm or more, most of all {first} and {second} by {1e3 * depths.max():.0f} mm "
-        f"{'after' if late else 'in'} frame {worst}"
+        f"{'after' if part else 'in'} frame {worst}"
     )
 
 
