@@ -237,8 +237,7 @@ def _depths(fitter: Fitter, holds: Holds, q: Array) -> Array:
         fitter.see(holds.moved(frame))
         depths[frame, 0] = fitter.depth(posture)
     for frame, (before, after) in enumerate(pairwise(q)):
-        fitter.see(moved := holds.moved(frame))
-        for part in () if moved else (4, 2, 6, 1, 3, 5, 7):
+        for part in () if holds.moved(frame) else (4, 2, 6, 1, 3, 5, 7):
             if part == 4 or max(depths[frame].max(), depths[frame + 1, 0]) >= 0.5 * DEEP:
                 depths[frame, part] = fitter.depth(pin.interpolate(fitter.model, before, after, part / 8))
     return depths
