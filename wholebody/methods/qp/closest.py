@@ -89,10 +89,10 @@ class Closest(Stage):
             gain = total - self._merit(with_values(predicted, goal=float(goal)))
             held = not self.contacts or max(here.violation.hold, here.violation.elastic) <= enough
             if gain <= (flat * total if held else enough):
-                if held or self._share <= NEAREST.least_share:
+                if held or self._share < 1.0:
                     converged = True
                     break
-                self._share *= 0.1
+                self._share = NEAREST.share
                 here, bent, radius = self.look(here.at.q), None, NEAREST.radius
                 continue
             step = float(np.abs(x).max(initial=0.0))

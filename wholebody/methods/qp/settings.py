@@ -139,8 +139,8 @@ class NearestNumbers(NamedTuple):
     # programs; more: shorter steps, ends farther off (at 0.2 by centimetres).
     damping: float = 3e-2
     negligible: float = 1e-2  # share of the largest curvature below which a direction is left out
-    # least share of the goals against constraints. Larger: limbs stay inside of what moves goals farther than itself.
-    least_share: float = 1e-3
+    # of the goals against constraints where it rests on violated ones. Larger: limbs stay inside of things.
+    share: float = 1e-3
 
 
 class SearchNumbers(NamedTuple):
