@@ -159,6 +159,16 @@ def test_feet_rest_where_they_do(height: Terrain) -> None:
         assert each.height == pytest.approx(height(round(foot / STEP) * STEP) - lowest, abs=0.02)
 
 
+@pytest.mark.parametrize("tread", [0.42, 0.68])
+def test_the_foot_that_alone_is_slow_bears_on_steep_stairs(tread: float) -> None:
+    """Two stairs lower or higher than the other one in a stride: heel and toe are slow, and were taken to hang."""
+    motion, stands = walker(lambda x: -0.14 / 0.42 * tread * float(np.floor((x + 0.01) / tread)), 5.0)
+    found = wb.motion.ground(motion)
+    for side, mask in stands.items():
+        seen = np.any([found.rests[f"{side}_{part}"] for part in ("ankle", "toe")], axis=0)
+        assert (seen == mask).mean() > 0.95
+
+
 @pytest.mark.parametrize("size", [0.4, 3.0])
 def test_skeletons_of_any_size_rest_when_a_person_does(size: float, tmp_path: Path) -> None:
     """A toy and a giant climb stairs; a robot that gets their walks goes as behind the person."""

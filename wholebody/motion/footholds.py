@@ -130,7 +130,10 @@ def resting(
             lower = np.flatnonzero(accepted & (base < base[number] - limits.height)).tolist()
             lower = [j for j in lower if stands[j][0] in other]
             hangs = hangs or (centre is not None and _unloaded(places, centre, stands, number, lower))
-            stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt)) or _bears(run, dt, found, marks)
+            stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt))
+            rest = [each for each in range(len(points)) if each != k]
+            rest = [each for each in rest if points[each].foot != points[k].foot] or rest
+            stays = stays or _bears(run, dt, found, marks[:, rest])
         seen.add(number)
         if stays:
             accepted[number] = True
@@ -220,9 +223,9 @@ def _unloaded(
     return bool((loads < LOADED).all())
 
 
-def _bears(run: Window, dt: float, found: Mask, marks: Mask) -> bool:
-    """Whether the body has nothing else than one point that may bear it during a rest of that."""
-    alone = ~(found[run.first : run.end].any(axis=1)) & (marks[run.first : run.end].sum(axis=1) <= 1)
+def _bears(run: Window, dt: float, found: Mask, others: Mask) -> bool:
+    """Whether nothing that is `found` (n, p), and no slow point of the other foot (n, m), bears during a rest."""
+    alone = ~(found[run.first : run.end].any(axis=1) | others[run.first : run.end].any(axis=1))
     return bool(alone.sum() * dt > WAITED)
 
 
