@@ -182,3 +182,6 @@ def test_how_much_nearer_goals_may_come_is_known_of_a_rod(planar_arm):
     stopped = wb.Scene(planar_arm((1.0,), limit=0.5))
     ahead = wb.Problem(stopped, goals=[wb.Point("tip", (0.0, 1.0, 0.0))])
     assert wb.assess(ahead, np.array([0.5])).first_order.nearer == 1.0
+    assert wb.assess(ahead, np.array([0.4995])).nearest  # 0.5 mm before the limit, where 1021 mm are left
+    assert not wb.assess(ahead, np.array([0.45])).nearest  # the limit is 4.5 % nearer
+    assert wb.assess(wb.Problem(stopped), np.zeros(1)).nearest

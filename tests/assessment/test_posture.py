@@ -288,6 +288,7 @@ def test_optimality_and_blockers_are_of_the_moment_of_the_judgement(human):
     q = postures[0]
     now, later = wb.assess(problem, q), wb.assess(problem, q)
     expected = now.optimality, now.blockers
+    nearer = now.first_order.nearer
     assert expected[1]
     wb.assess(problem, postures[1])
     for number in range(12):
@@ -295,8 +296,10 @@ def test_optimality_and_blockers_are_of_the_moment_of_the_judgement(human):
     problem.clearances += 0.1
     problem.retarget([wb.Point("left_index_tip", (0.0, 0.0, 0.0))])
     assert (later.optimality, later.blockers) == expected
+    assert later.first_order.nearer == nearer
     restored = pickle.loads(pickle.dumps(now))
     assert restored == now
     assert (restored.optimality, restored.blockers) == expected
+    assert restored.first_order.nearer == nearer
     assert restored.summary() == now.summary()
     assert now.summary()["blockers"][0]["names"] == expected[1][0].names

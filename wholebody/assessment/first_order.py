@@ -66,8 +66,11 @@ class _Asked(NamedTuple):
 class FirstOrder:
     """Optimality and blockers of a judged posture, computed at the first request."""
 
-    def __init__(self, problem: Problem, pairs: AllPairs, fits: bool, near: bool) -> None:
-        """Keep what they need; `fits`: nothing blocks the posture, `near`: a pair may be near its clearance."""
+    def __init__(self, problem: Problem, pairs: AllPairs, fits: bool, near: bool, errors: tuple[float, ...]) -> None:
+        """Keep what they need; `fits`: nothing blocks the posture, `near`: a pair may be near its clearance.
+
+        `errors` are those of the goals.
+        """
         if fits:
             self.blockers = ()
         self.fits = fits
@@ -78,9 +81,12 @@ class FirstOrder:
         self._built, self._q = scene.built, pairs.state.q.copy()
         self._near = pairs.nearer(problem.clearances + ACTIVE) if near else pairs.none
         self._clearances = problem.clearances[self._near.number]
+        roots = np.sqrt([goal.weight for goal in problem.goals])
+        self._within = 5e-3 * float(np.linalg.norm(roots * errors) / roots.max(initial=1e-300))
+        self._beside = pairs.nearer(problem.clearances + self._within) if self._within > ACTIVE else self._near
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"fits": self.fits, "optimality": self.optimality, "blockers": self.blockers}
+        return {name: getattr(self, name) for name in ("fits", "optimality", "nearer", "blockers")}
 
     @cached_property
     def residual(self) -> Array:
@@ -97,14 +103,16 @@ class FirstOrder:
     def nearer(self) -> float:
         """The share of its goals' errors that a posture would leave that moves along what nothing balances.
 
-        Errors are linear in the motion, which turns no joint by more than a radian. It is 1 at a minimum.
+        Errors are linear in the motion, which turns no joint by more than a radian. It is 1 at a minimum, and without
+        goals. What is nearer than 0.5 % of the errors counts as active: descents end as near to it.
         """
         with self._lent() as state:
             rows = [values_and_rows(goal, goal.error, state) for goal in self._asked.goals]
             roots = [np.sqrt(goal.weight) for goal in self._asked.goals]
             error = np.concatenate([np.zeros(1), *(root * each for root, (each, _) in zip(roots, rows, strict=True))])
-            pull = sum((root * each @ (root * jacobian) for root, (each, jacobian) in zip(roots, rows, strict=True)))
-            active = _active(self._asked, state, self._near)
+            pull = np.zeros(state.model.nv)
+            pull += sum(root * each @ (root * jacobian) for root, (each, jacobian) in zip(roots, rows, strict=True))
+            active = _active(self._asked, state, self._beside, max(ACTIVE, self._within))
             _, way = _balanced(pull, active.signed, active.one_sided)
             led = [root * jacobian @ way for root, (_, jacobian) in zip(roots, rows, strict=True)]
         led = np.concatenate([np.zeros(1), *led])
@@ -208,25 +216,25 @@ class _Active(NamedTuple):
     contacts: list[int]
 
 
-def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
+def _active(asked: _Asked, state: State, near: NearPairs, within: float = ACTIVE) -> _Active:
     nv = state.model.nv
     signed, one_sided = _Rows(nv), _Rows(nv)
     gaps, contacts = near.gradients(state)
     one_sided.add(gaps, [near.label(number) for number in contacts])
     for number, constraint in enumerate(asked.constraints):
         value, jacobian = values_and_rows(constraint, constraint.value, state)
-        low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
+        low, high = value <= constraint.lower + within, value >= constraint.upper - within
         label: Label = ("constraint", (asked.names[number],))
         signed.add(jacobian[low & high], [label] * int((low & high).sum()))
         one_sided.add(jacobian[low & ~high], [label] * int((low & ~high).sum()))
         one_sided.add(-jacobian[high & ~low], [label] * int((high & ~low).sum()))
     lower, upper = asked.figure.tangent_bounds(state.q)
-    limited_low, limited_high = lower >= -ACTIVE, upper <= ACTIVE
+    limited_low, limited_high = lower >= -within, upper <= within
     for bound in asked.bounds:
         low_bound, high_bound = bound.bounds(state, None)
         lower, upper = np.maximum(lower, low_bound), np.minimum(upper, high_bound)
     identity, names = np.eye(nv), state.model.names
-    for at_work, sign, limited in ((lower >= -ACTIVE, 1.0, limited_low), (upper <= ACTIVE, -1.0, limited_high)):
+    for at_work, sign, limited in ((lower >= -within, 1.0, limited_low), (upper <= within, -1.0, limited_high)):
         columns = np.flatnonzero(at_work)
         labels: list[Label] = [
             ("limit" if limited[k] else "bound", (names[joint_of(state.model, int(k))],)) for k in columns

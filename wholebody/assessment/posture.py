@@ -179,7 +179,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         constraint_violation=missed,
         measure=sum([one(term, "value", term.weight * term.value(state)) for term in problem.measures], 0.0),
         goal_errors=each,
-        first_order=FirstOrder(problem, pairs, fits, short > -2.0 * ACTIVE),
+        first_order=FirstOrder(problem, pairs, fits, short > -2.0 * ACTIVE, each),
         seconds=time.perf_counter() - began,
     )
 

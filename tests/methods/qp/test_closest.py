@@ -106,6 +106,10 @@ def test_no_goal_is_worth_an_overlap_however_short_its_lever(tmp_path):
     assert local.converged
     assert local.violation.elastic <= 1e-5
     assert local.q[0] == pytest.approx(touching, abs=1e-3)
+    far = wb.Scene(scene.figure).add(wb.Sphere(0.01), name="ball", at=(1.0, 0.0, 0.0))
+    behind = wb.Problem(far, goals=[wb.Point("tip", (0.6, -1.0, 0.0))])
+    assert wb.assess(behind, [np.arcsin(0.03) + 5e-4]).nearest  # of an angle of more than a radian
+    assert not wb.assess(behind, [np.arcsin(0.03) + 0.05]).nearest
 
 
 def test_what_must_hold_and_cannot_is_infeasible(standing, honest):
@@ -256,3 +260,24 @@ def test_of_a_goal_in_things_an_arm_comes_as_near_as_descents_from_random_starts
         missed += [other.goal_error] if other.penetration < 1e-5 else []
     assert len(missed) > 10
     assert solution.assessment.goal_error <= 1.5 * min(missed)
+
+
+def test_where_the_closest_posture_is_a_tenth_of_a_millimetre_beside_what_keeps_it_off_it_is_the_closest():
+    """A tool that must stay out of a ball comes as near to a point in it as its surface; the word was `stalled`."""
+    figure, start = known_arm("ur10")
+    centre, radius, target = np.array([0.352, -0.321, 0.672]), 0.272, (0.315, -0.304, 0.632)
+
+    class Outside(wb.Constraint):
+        lower, upper = np.array([radius]), np.array([np.inf])
+
+        def value(self, state):
+            return np.array([np.linalg.norm(figure.placement(state.q, "tool").translation - centre)])
+
+        def jacobian(self, state):
+            steps = (1e-6 * axis for axis in np.eye(6))
+            ahead = [np.linalg.norm(figure.placement(state.q + step, "tool").translation - centre) for step in steps]
+            return (np.array([ahead]) - self.value(state)) / 1e-6
+
+    solution = wb.solve(wb.Problem(wb.Scene(figure), start, goals=[wb.Point("tool", target)], constraints=[Outside()]))
+    assert solution.assessment.goal_error == pytest.approx(radius - np.linalg.norm(target - centre), rel=1e-2)
+    assert solution.status == "unreachable"
