@@ -94,6 +94,9 @@ def test_totals_are_medians_of_each_figure_and_tool() -> None:
     assert (one["clips"], one["without overlap in frames"], one["slide mm/s"]) == (2, 1, 3.0)
     assert (one["deepest mm, median"], one["deepest mm, most"]) == (6.0, 8.0)
     assert (other.case, other["clips"]) == ("man", 1)
+    (lying,) = totals([Row("a, man", "one", {**rows[0].figures, "slide mm/s": float("nan")})])
+    assert np.isnan(number(lying["slide mm/s"]))
+    assert lying["jerk"] == 1.0
 
 
 def test_both_tools_follow_a_recording(tmp_path: Path) -> None:
@@ -107,7 +110,7 @@ def test_both_tools_follow_a_recording(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_recordings_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no \.bvh files"):
+    with pytest.raises(InputError, match=r"is no folder with \.bvh files"):
         list(compare(tmp_path, [wb.load("human")], 4))
 
 

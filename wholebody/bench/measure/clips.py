@@ -50,7 +50,7 @@ def compare(folder: Path, figures: Sequence[wb.Figure], frames: int) -> Iterator
     tools = TOOLS if find_spec("mink") else TOOLS[:1]
     files = sorted(folder.rglob("*.bvh"))
     if not files:
-        raise InputError(f"{folder}: there are no .bvh files; give a folder of recordings")
+        raise InputError(f"{folder} is no folder with .bvh files; give one of recordings")
     for path in files:
         motion = _thinned(wb.motion.read_skeleton(path))
         motion = motion.part(0, min(frames, len(motion)))
@@ -139,10 +139,10 @@ def totals(rows: Sequence[Row]) -> list[Row]:
     for figure, tool in dict.fromkeys((_figure(row), row.tool) for row in rows):
         mine = [row for row in rows if (_figure(row), row.tool) == (figure, tool)]
         free = sum(str(row["frames that overlap"]).startswith("0 ") for row in mine)
-        middle = {
-            name: float(np.nanmedian([float(row[name]) for row in mine]))
-            for name in ("bones median deg", "slide mm/s", "jerk", "frames a s")
-        }
+        middle = dict[str, float]()
+        for name in ("bones median deg", "slide mm/s", "jerk", "frames a s"):
+            known = [value for row in mine if not np.isnan(value := float(row[name]))]  # who never rests does not slide
+            middle[name] = float(np.median(known)) if known else float("nan")
         deep = np.array([float(row["deepest mm"]) for row in mine])
         figures: dict[str, Figure] = {"clips": len(mine), "without overlap in frames": free, **middle}
         figures |= {"deepest mm, median": float(np.median(deep)), "deepest mm, most": float(deep.max())}
