@@ -112,9 +112,8 @@ class Assessment:
     @property
     def nearest(self) -> bool:
         """Whether to first order no motion that is free leaves less than 98 % of the goals' errors."""
-        return (
-            self.first_order.nearer >= 0.98
-        )  # of true minima 0.995 or more, where a method stopped short 0.95 or less
+        # at minima it is 0.995 or more, where a method stopped short 0.95 or less
+        return self.first_order.nearer >= 0.98
 
     @property
     def in_the_way(self) -> str:
