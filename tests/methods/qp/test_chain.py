@@ -172,7 +172,7 @@ def test_what_is_found_is_at_the_goal_to_rounding(arm):
     for _ in range(40):
         goal = random_goal(arm, "tip", rng, True)
         met = found(wb.Problem(wb.Scene(arm), START, goals=[goal]))
-        if met is not None:
+        if met is not None and not met.near:
             count += 1
             off = pin.log6(place_of(arm, met.q, "tip").actInv(pin.SE3(goal.target))).vector
             assert np.abs(off).max() < 1e-9

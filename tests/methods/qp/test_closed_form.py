@@ -327,6 +327,24 @@ def test_goals_that_hardly_overlap_are_out_of_reach_and_missed_by_no_more_than_w
         assert solution.assessment.goal_error <= min(wb.assess(problem, q).goal_error for q in free)
 
 
+@pytest.mark.parametrize("name", ["panda", "xarm7", "gen3"])
+def test_a_goal_that_seven_joints_meet_nowhere_free_is_missed_by_no_more_than_from_random_starts(name):
+    """A random goal whose known posture overlaps the arm; a search from forty starts solved none of such either."""
+    figure, start = known_arm(name)
+    scene, rng = wb.Scene(figure), np.random.default_rng(4)
+    lower, upper = np.maximum(figure.limits.lower, -np.pi), np.minimum(figure.limits.upper, np.pi)
+    solved = True
+    while solved:
+        place = figure.placement(rng.uniform(lower, upper), "tool")
+        problem = wb.Problem(scene, start, goals=[wb.Frame("tool", place)])
+        solved = (solution := wb.solve(problem)).solved
+    assert solution.assessment.holds(1e-5)
+    assert solution.iterations < 400
+    alone = wb.methods.QP(restarts=0, measures=False)
+    others = [wb.solve(problem.with_start(q), alone).assessment for q in rng.uniform(lower, upper, (8, 7))]
+    assert solution.assessment.goal_error <= 1.1 * min(each.goal_error for each in others if each.holds(1e-5))
+
+
 def test_the_nearest_of_a_goal_inside_of_a_thing_is_chosen_among_all_ends(monkeypatch):
     """Also where the first of them meets the goal, inside of the thing: the others would be what memory held before."""
     figure, counted = known_arm("ur10")[0], []

@@ -134,11 +134,10 @@ class Descents:
                 met = self._ended(np.concatenate([ends[found[:, 2] < 0.0], others]), enough, others=True)
             if met is None and finite:
                 others = self.chain.singular(self.asked.goals, self.asked.nearest)
-                if len(others):  # what their samples do not meet is not out of reach
-                    return self._of_singular(others)
-                # Inequalities reject what is nearest: the search for the closest posture goes along them.
-                begins = None if self.asked.bounded else self._if_out_of_reach()
-                return None if begins is None else self._nearest(begins)
+                if len(others) and (met := self._of_singular(others)) is not None:
+                    return met
+                loosely = self.chain.loosely_met(self.asked.goals, self.settings.seed)
+                return self._nearest(np.concatenate([others, loosely]))
             unsettled = met is not None and self.measured and not met.stationary  # as limits are near
             if (met is not None and met.blocked is None and not unsettled) or finite or self.control.over:
                 return met
@@ -175,6 +174,9 @@ class Descents:
             redundant = self.measured and len(self.start) > self.rule.rows
             if number == SEEDS.weighed and redundant and self.blocked is not None:
                 self.measured = False  # ends of least effort gather at the same places: of others more are free
+        if best is None and guided:
+            branches = self._branches()
+            return self._nearest(branches.values[branches.effort < np.inf])
         return best
 
     def _or_from_random(self, met: Met | None) -> Met | None:
@@ -275,32 +277,13 @@ class Descents:
     def _branches(self) -> Branches:
         return self.chain.branches(self.asked.goals, self.asked.nearest)
 
-    def _if_out_of_reach(self) -> list[Array] | None:
-        """What of six joints' postures at the goal hardly overlaps (n,), if all there and nearby are not free."""
-        chain, (goals, at, _, clearances, *_) = self.chain, self.asked
-        if self.settings.tolerance > NEARBY:
-            return None  # postures farther from the goal would do
-        found = chain.loosely_met(goals, self.settings.seed)
-        if len(found) and self.workspace.model.nv > len(self.start):
-            return None  # others may make room
-        deep, hardly = clearances - SEEDS.deep, list[Array]()
-        within = max(0.0, self.within - SEEDS.deep)
-        for values in found:
-            q = chain.posture(values, at)
-            if is_free(self.workspace, q, clearances, self.within):
-                return None
-            if is_free(self.workspace, q, deep, within):
-                hardly.append(values)
-        return hardly
-
     def _of_singular(self, others: Array) -> Met | None:
         """A free posture of a singular placement: one of samples (k, n), else beside one that hardly overlaps."""
-        at, clearances, gaps = self.asked.at, self.asked.clearances, list[float]()
+        at, gaps = self.asked.at, list[float]()
         for values in others:
             if self._is_free(q := self.chain.posture(values, at)):
                 return Met(q, tuple(self.trace), False)  # a descent goes on along the others
-            near = self.workspace.near(q, self.within)
-            gaps.append(float((near.distance - clearances[near.number]).min(initial=0.0)))
+            gaps.append(self._gap(q))
         contacts = self._contacts()
         for values in others[np.argsort(gaps)[: -SEEDS.together : -1]]:
             found = None if self.control.over else contacts.least(values, np.inf, SEEDS.radius)
@@ -308,12 +291,20 @@ class Descents:
                 return Met(q, tuple(self.trace), False)
         return None
 
-    def _nearest(self, near: list[Array]) -> Met:
-        """The closest postures of descents from the first seeds with everything held: a few, which differ."""
-        seeds = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together))
+    def _nearest(self, inside: Array) -> Met | None:
+        """The closest posture where all at the goals overlap, as samples `inside` (k, n) do; None: others may do.
+
+        It is sought from the sample that overlaps least, and from ends of the first seeds that are free.
+        """
+        room = len(inside) and self.workspace.model.nv > len(self.start)  # other joints may make room
+        # inequalities reject what is nearest; with such a tolerance postures farther from the goal would do
+        if room or self.asked.bounded or self.settings.tolerance > NEARBY:
+            return None
+        seeds, at = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together)), self.asked.at
         # All of them, although some may meet the goals inside of things.
         found, _ = self._descended(seeds, how_far(self.settings, len(seeds), others=True))
-        values, at = list[Array](), self.asked.at
+        gaps = [self._gap(self.chain.posture(each, at)) for each in inside]
+        near, values = [inside[int(np.argmax(gaps))]] if gaps else [], list[Array]()
         free = (seeds[k] for k in found[:, 0].argsort() if self._is_free(self.chain.posture(seeds[k], at)))
         for each in joined(near, free):
             if all(np.abs(each - other).max() > SEEDS.differing for other in values):
@@ -372,6 +363,11 @@ class Descents:
     def _effort(self, q: Array) -> float:
         away = self.chain.angles(q) - self.asked.nearest[0]
         return float(self.asked.nearest[1].dot(away * away))
+
+    def _gap(self, q: Array) -> float:
+        """The least of distances less clearances at q (nq,), at most 0 [m]."""
+        near = self.workspace.near(q, self.within)
+        return float((near.distance - self.asked.clearances[near.number]).min(initial=0.0))
 
     def _is_free(self, q: Array) -> bool:
         if not (is_free(self.workspace, q, self.asked.clearances, self.within) and self._is_defined(q)):

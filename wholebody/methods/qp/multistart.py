@@ -49,14 +49,18 @@ class QPMultistart(Search):
         # `rest`: residual at which descents through things rest; `least`: measures where the goals are known to be met,
         # if through things; 0 where nothing is known
         self.out_of_reach, self._through_measure = bool(near), least
-        self.contradictions = contradictions(self.problem, self.lineariser.workspace) if near else ()
         if not near:
             self.search(self._attempts(begin))
             other = self._start if self._doubtful and self.how == "from a squat" else other
         else:
-            self._rest = max(rest, SEEDS.deep)
+            self.contradictions = contradictions(self.problem, self.lineariser.workspace)
+            self._least, self._rest = least_left(self.contradictions) or 0.0, max(rest, SEEDS.deep)
         for q in near:
             self.accept(self._ran(self._closest(), q))
+            if self._proven():
+                break
+        if near and self.settings.measures and self.solves(self.best):
+            self.accept(self._descend(self.best.q))
         if other is not None:
             self.accept(self.directly(other), "directly")
         self._find_closest()
@@ -326,7 +330,7 @@ class QPMultistart(Search):
         tolerance = self.settings.tolerance
         if self.control.over:
             return
-        if self.out_of_reach:
+        if self.out_of_reach and not self._proven():
             self.accept(self._ran(self._closest(), self.best.q))
         if not held(self.best, tolerance):
             self.accept(self._stay(self.best))
@@ -335,7 +339,8 @@ class QPMultistart(Search):
         if not self.out_of_reach and self.best.violation.worst > tolerance:
             self._closest_from_best()
         many = SEARCH.reach_trials_few if self._rest is None else SEARCH.agreeing_few
-        self._pass_things(many if (self.out_of_reach or self._least) and self._few() else 0)
+        if not self._proven():
+            self._pass_things(many if (self.out_of_reach or self._least) and self._few() else 0)
         if self.best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(self.best)
             if held(local, tolerance) and local.violation.left <= self.best.violation.left + tolerance:
