@@ -103,6 +103,19 @@ def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
         np.testing.assert_allclose(room.jacobian[:, joint], slope, atol=1e-6)
 
 
+def test_what_other_joints_move_is_not_moved_by_the_chain_alone(two_arms):
+    """Joints beside the chain are turned at random: what they leave in its place is what the chain alone moves."""
+    model, rng = two_arms.model, np.random.default_rng(2)
+    joints = [number for number, name in enumerate(model.names) if number and not name.startswith("right")]
+    chain = PlainChain(model, two_arms.limits, tuple(joints))
+    q = rng.uniform(model.lowerPositionLimit, model.upperPositionLimit)
+    other = chain.posture(chain.angles(q), rng.uniform(model.lowerPositionLimit, model.upperPositionLimit))
+    first, second = (State(model).update(each).joints.copy() for each in (q, other))
+    stays = np.abs(first - second).max(axis=(1, 2)) < 1e-12
+    assert stays.sum() == 5
+    np.testing.assert_array_equal(chain.alone, stays)
+
+
 def descended(chain, goals, nearest, asked, seeds):
     """What descents from seeds (k, n), which become where they end, find (k, 4)."""
     return chain.descents(goals.tables[None], goals, nearest[None], asked, seeds[None], len(seeds))[0][0]

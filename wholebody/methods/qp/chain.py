@@ -283,7 +283,7 @@ class Descents:
         for values in others:
             if self._is_free(q := self.chain.posture(values, at)):
                 return Met(q, tuple(self.trace), False)  # a descent goes on along the others
-            gaps.append(self._gap(q))
+            gaps.append(self._gaps(q)[0])
         contacts = self._contacts()
         for values in others[np.argsort(gaps)[: -SEEDS.together : -1]]:
             found = None if self.control.over else contacts.least(values, np.inf, SEEDS.radius)
@@ -296,15 +296,15 @@ class Descents:
 
         It is sought from the sample that overlaps least, and from ends of the first seeds that are free.
         """
-        room = len(inside) and self.workspace.model.nv > len(self.start)  # other joints may make room
+        gaps = np.array([self._gaps(self.chain.posture(each, self.asked.at)) for each in inside]).reshape(-1, 2)
+        room = self.workspace.model.nv > len(self.start) and (gaps[:, 1] >= 0.0).any()  # other joints may make it
         # inequalities reject what is nearest; with such a tolerance postures farther from the goal would do
         if room or self.asked.bounded or self.settings.tolerance > NEARBY:
             return None
         seeds, at = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together)), self.asked.at
         # All of them, although some may meet the goals inside of things.
         found, _ = self._descended(seeds, how_far(self.settings, len(seeds), others=True))
-        gaps = [self._gap(self.chain.posture(each, at)) for each in inside]
-        near, values = [inside[int(np.argmax(gaps))]] if gaps else [], list[Array]()
+        near, values = [inside[gaps[:, 0].argmax()]] if len(gaps) else [], list[Array]()
         free = (seeds[k] for k in found[:, 0].argsort() if self._is_free(self.chain.posture(seeds[k], at)))
         for each in joined(near, free):
             if all(np.abs(each - other).max() > SEEDS.differing for other in values):
@@ -364,10 +364,12 @@ class Descents:
         away = self.chain.angles(q) - self.asked.nearest[0]
         return float(self.asked.nearest[1].dot(away * away))
 
-    def _gap(self, q: Array) -> float:
-        """The least of distances less clearances at q (nq,), at most 0 [m]."""
+    def _gaps(self, q: Array) -> tuple[float, float]:
+        """The least distance less its clearance at q (nq,) of pairs, and of those no other joint moves; at most 0 m."""
         near = self.workspace.near(q, self.within)
-        return float((near.distance - self.asked.clearances[near.number]).min(initial=0.0))
+        gaps = near.distance - self.asked.clearances[near.number]
+        own = self.chain.alone[self.workspace.table.joint[near.pair]].all(axis=1)
+        return float(gaps.min(initial=0.0)), float(gaps[own].min(initial=0.0))
 
     def _is_free(self, q: Array) -> bool:
         if not (is_free(self.workspace, q, self.asked.clearances, self.within) and self._is_defined(q)):

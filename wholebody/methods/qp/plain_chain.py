@@ -39,6 +39,7 @@ class PlainChain:
         idx_v: (n,) place of each joint in the tangent.
         joints: (n + 1,) their numbers in the model, the world first.
         carriers: (njoints,) the joint of the chain, or the world, that carries each of the model.
+        alone: (njoints,) whether no joint beside the chain moves each.
         arm: the arm that they are, None where it has no closed form.
         guide: the same, or an arm that they nearly are.
         held: the joint that the closed form of the guide holds; -1 for none.
@@ -60,6 +61,7 @@ class PlainChain:
             [number[one] for one in list(model.supports[joint]) if one in number] for joint in range(model.njoints)
         ]
         self.carriers = np.array([every[-1] for every in above])
+        self.alone = np.array([len(every) == len(model.supports[joint]) for joint, every in enumerate(above)])
         self._bodies[1:] = [[inertia.mass, *(inertia.mass * inertia.lever)] for inertia in inertias]
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
         self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
