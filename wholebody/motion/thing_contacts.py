@@ -183,7 +183,7 @@ BODY = {
 }
 """Of parts that hands touch both ends of a bone, and how far a hand that touches them is from it, metres."""
 
-# s that a hand rests on the head or on the other hand, and on what hands pass: arms that swing little are slow for 0.4 s
+# s that a hand rests on the head or another hand, and on what hands pass: arms that swing little are slow for 0.4 s
 RESTS, PASSED = 0.2, 0.5
 HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
 ARM = ("shoulder", "elbow", "wrist", "hand")
