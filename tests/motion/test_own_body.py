@@ -17,6 +17,7 @@ from tests.motion.test_things import robot, with_hands
 from wholebody.motion.holds import Holds
 from wholebody.motion.posture_fit import Fitter
 from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.thing_contacts import own_rests
 
 STARTS = {
     "head": {"right_shoulder_flexion": 1.6, "right_elbow_flexion": 2.0},
@@ -27,7 +28,7 @@ STARTS = {
         "right_shoulder_flexion": 0.6, "right_elbow_flexion": 0.5,
     },
 }  # fmt: skip
-HELD = slice(6, 22)  # frames in which the source touches
+HELD = slice(6, 26)  # frames in which the source touches
 
 
 def touching(part: str, folder: Path) -> tuple[SkeletonMotion, wb.Clip]:
@@ -94,6 +95,21 @@ def test_a_hand_that_rests_on_the_body_does_so(part: str, stature: float, tmp_pa
 def test_hands_of_a_walk_swing_past_the_thighs(shared_data: Path) -> None:
     motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_35_01.bvh").part(0, 60)
     assert to_part(wb.retarget(motion, wb.load("human")), "right_thigh")[:, 0].min() > 0.02
+
+
+def test_an_arm_that_swings_little_touches_no_hip() -> None:
+    """Swings of 5 cm either way in 1.4 s: at each end the hand is slower than 0.15 m/s for a third of a second."""
+    names = ("hips", "left_hip", "right_hip", "right_wrist")
+    places, time = np.zeros((90, 4, 3)), np.arange(90) / 30.0
+    places[:, :, 2] = 1.0
+    places[:, 1:, 1] = 0.1, -0.1, -0.21
+    rests = []
+    for far in (0.05, 0.0):
+        places[:, 3, 0] = far * np.sin(2.0 * np.pi / 1.4 * time)
+        turns = np.tile(np.eye(3), (90, 4, 1, 1))
+        motion = SkeletonMotion(names, np.array([-1, 0, 0, 0]), places[0] - places[0, :1], turns, places, 1 / 30)
+        rests.append(own_rests(motion, {name: name for name in names[1:]}, {"right_wrist": 1.0}, []))
+    assert [[(rest.thing, rest.first, rest.end) for rest in each] for each in rests] == [[], [("pelvis", 0, 90)]]
 
 
 def hand_distance(clip: wb.Clip, ends: str) -> np.ndarray:

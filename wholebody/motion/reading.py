@@ -28,6 +28,8 @@ from wholebody.motion.roles import column_names
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way
 from wholebody.motion.structure import is_sized, stands_along
 
+JUMP = 10.0  # lengths of a body in a second: twice the fastest sprint
+
 
 def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
     """Read a skeleton that moves, in metres with z up.
@@ -132,6 +134,15 @@ def _say(motion: SkeletonMotion, path: Path) -> None:
         warn(
             f"{one_line(path.name)}: its frames are {motion.dt:g} s apart, and speeds are of that; recordings have 20 "
             "or more a second: if it has, correct it with dataclasses.replace(motion, dt=1 / 30)"
+        )
+    steps = np.linalg.norm(np.diff(motion.positions[:, 0], axis=0), axis=1)
+    jumps = np.flatnonzero(steps > JUMP * motion.dt * longest_way(motion.parents, motion.offsets))
+    if len(jumps) and motion.dt <= 0.25:
+        at = int(jumps[0])
+        warn(
+            f"{one_line(path.name)}: {motion.names[0]} jumps by {steps[at]:.1f} m from frame {at} to the next"
+            f"{f', and {len(jumps) - 1} times more' if len(jumps) > 1 else ''}; if recordings were joined there, take "
+            f"them apart by motion.part(0, {at + 1}) and motion.part({at + 1}, {len(motion)})"
         )
     for note in motion.notes:
         logging.getLogger(__name__).info("%s: %s", one_line(path.name), note)

@@ -183,6 +183,8 @@ BODY = {
 }
 """Of parts that hands touch both ends of a bone, and how far a hand that touches them is from it, metres."""
 
+# s that a hand rests on the head or another hand, and on what hands pass: arms that swing little are slow for 0.4 s
+RESTS, PASSED = 0.2, 0.5
 HAND = 0.06  # m: as far from each other are hands that touch; half of it is a hand without pieces thick
 ARM = ("shoulder", "elbow", "wrist", "hand")
 
@@ -228,7 +230,8 @@ def own_rests(
             # what is farther by over 20 mm is not touched: hands swing past hips
             near = near_and_slow(local, far - reach, 0.02, motion.dt) & free[role] & (far > 1e-3)
             near &= free.get(name, near)
-            for run in runs(long_runs(near, max(1, round(0.2 / motion.dt)))):  # s: for less, hands pass it
+            least = RESTS if name in {"head", *shares} else PASSED
+            for run in runs(long_runs(near, max(1, round(least / motion.dt)))):
                 normal = way[(run.first + run.end) // 2]
                 found.append(ThingContact(role, *run, name, np.zeros(3), normal / np.linalg.norm(normal), share))
                 for taken in {role, name} & free.keys():

@@ -196,3 +196,14 @@ def test_frames_that_are_a_second_apart_are_told(step: str, told: bool, tmp_path
         warnings.simplefilter("always")
         read(tmp_path, text(hips(), rows, f"MOTION\nFrames: {{n}}\nFrame Time: {step}\n"))
     assert any("its frames are 1 s apart" in str(each.message) for each in said) == told
+
+
+@pytest.mark.parametrize(("far", "told"), [(80.0, True), (8.0, False)])
+def test_a_body_that_jumps_as_none_can_is_told(far: float, told: bool, tmp_path: Path, rows: np.ndarray) -> None:
+    """8 m/s of a body of 1 m in its recording, and ten times that where two were joined."""
+    rows[:, :3] = np.where(np.arange(8)[:, None] < 5, 0.0, far) * (1.0, 0.0, 0.0)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read(tmp_path, text(hips(), rows))
+    sentence = "Hips jumps by 0.8 m from frame 4 to the next; if recordings were joined there, take them apart by"
+    assert any(f"{sentence} motion.part(0, 5) and motion.part(5, 8)" in str(each.message) for each in said) == told

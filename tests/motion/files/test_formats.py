@@ -513,6 +513,8 @@ def test_a_rest_posture_that_turns_some_joints_is_left_out(tmp_path: Path) -> No
         return len(wb.motion.read_skeleton(tmp_path / "a.bvh").positions)
 
     assert frames(np.vstack([rest, moving])) == 20
+    noisy = rest + 0.2 * np.cos(np.arange(18.0))  # degrees: as of motions that were brought onto another skeleton
+    assert frames(np.vstack([noisy, moving])) == 20
     assert frames(moving) == 20
     ways_in = rest + np.linspace(0.0, 1.0, 20)[:, None] * (moving[:1] - rest)
     assert frames(np.vstack([ways_in, moving])) == 40  # it moves out of that posture

@@ -111,12 +111,14 @@ def _begins_with_rest(angles: Array) -> bool:
     if len(angles) < 2:
         return False
     still = 1e-3  # rad
-    turns = np.abs(angles) >= still
-    if not turns[0].any():
-        return bool(turns[1].any())
+    size = np.abs(angles)
+    if not (size[0] >= still).any():
+        return bool((size[1] >= still).any())
     moving = np.ptp(angles[1:], axis=0) >= still
-    # a tenth of the angles that change later are not zero in the rest postures of CMU, nine tenths in recorded frames
-    if len(angles) < 3 or not moving.any() or turns[0][moving].mean() >= 0.25:
+    # a tenth of the angles that change later turn in the rest postures of CMU, nine tenths in recorded frames; in those
+    # that were brought onto another skeleton they turn a little
+    turns = size[0] >= np.maximum(still, 0.1 * np.median(size[1:], axis=0))
+    if len(angles) < 3 or not moving.any() or turns[moving].mean() >= 0.25:
         return False
     turned = np.abs(np.angle(np.exp(1j * np.diff(angles, axis=0)))).max(axis=(1, 2))
     return bool(turned[0] > 3.0 * np.median(turned[1:]))
