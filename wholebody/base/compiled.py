@@ -21,7 +21,7 @@ from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, TypeVar
 
-from wholebody.base.compiler_passes import known_call_type, needed_passes
+from wholebody.base.call_types import known_call_type
 
 TOGETHER = (
     ("wholebody.terms.linearisation", "wholebody.terms.seldom_kernel", "wholebody.methods.qp.plain_chain"),
@@ -88,7 +88,7 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
     folder. If no folder is writable, every process compiles anew. A function that only compiled functions call,
     `inner`, is compiled sooner, and calling it from Python raises a TypeError.
     """
-    loop_type, passes = _inner_type() if inner else _loop_type(), needed_passes()
+    loop_type = _inner_type() if inner else _loop_type()
     _watch()
 
     def decorate(function: F) -> F:
@@ -99,7 +99,7 @@ def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
             "no_cpython_wrapper": inner,
             **options,
         }
-        loop: F = loop_type(function, targetoptions=target, pipeline_class=passes)
+        loop: F = loop_type(function, targetoptions=target)
         if inner and function.__name__.startswith("_"):
             return loop  # kept as a part of its callers, which are in the same module
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
