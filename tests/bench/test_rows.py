@@ -17,6 +17,7 @@ ROWS = [Row("a", "qp", {"ms": 1.25, "status": "solved"}), Row("b", "ccd", {"ms":
 def test_one_figure_of_all_rows_stands_in_a_table_of_two_ways() -> None:
     rows = [Row(case, tool, {"ms": ms}) for case, tool, ms in (("a", "qp", 1), ("b", "qp", 2), ("b", "ccd", 3))]
     assert across(rows, "ms") == [Row("qp", "", {"a": 1, "b": 2}), Row("ccd", "", {"b": 3})]
+    assert across(rows, "ms", columns="tool") == [Row("a", "", {"qp": 1}), Row("b", "", {"qp": 2, "ccd": 3})]
     assert across(rows[:1], "ms", "ms²") == [Row("qp", "", {"a, ms": 1})]
     assert table(across(rows, "ms")).splitlines()[-1] == "| ccd |  | 3 |"
     assert only(ROWS, "count", "ms") == [

@@ -87,13 +87,14 @@ def only(rows: Sequence[Row], *names: str) -> list[Row]:
     return [Row(row.case, row.tool, {name: row[name] for name in names if name in row.figures}) for row in rows]
 
 
-def across(rows: Sequence[Row], *names: str) -> list[Row]:
-    """Figures of rows as a table with two headings: a row a tool, a column a case and figure."""
+def across(rows: Sequence[Row], *names: str, columns: str = "case") -> list[Row]:
+    """Figures of rows as a table with two headings: a row a tool, a column a case and figure, or the reverse."""
     found: dict[str, dict[str, Figure]] = {}
     for row in rows:
-        titles = {name: row.case if len(names) == 1 else f"{row.case}, {name}" for name in names if name in row.figures}
-        found.setdefault(row.tool, {}).update({title: row[name] for name, title in titles.items()})
-    return [Row(tool, "", figures) for tool, figures in found.items() if figures]
+        down, column = (row.tool, row.case) if columns == "case" else (row.case, row.tool)
+        titles = {name: column if len(names) == 1 else f"{column}, {name}" for name in names if name in row.figures}
+        found.setdefault(down, {}).update({title: row[name] for name, title in titles.items()})
+    return [Row(down, "", figures) for down, figures in found.items() if figures]
 
 
 def shown(figure: Figure) -> str:

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wholebody.assessment.motion import pairs_along
 from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.measure.track import SETTING, Track, Verdict, judge
 from wholebody.bench.rows import Figure, Panel, Row, across, only, quiet, report, shares, texts, times
 from wholebody.bench.statistics import BLOCK, quantile_ratio
@@ -157,6 +158,19 @@ def result_rows(track: Track, runs: Runs) -> list[Row]:
     return rows
 
 
+def taking(track: Track, tools: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """The tools that can be set up for a reach and make a first step, and the sentences of those that cannot."""
+    taken, refused = [], {}
+    for name in tools:
+        try:
+            with quiet():
+                make_tool(name, track).step(track.targets[0])
+            taken.append(name)
+        except (InputError, RuntimeError, ValueError) as error:
+            refused[name] = " ".join(str(error).split()).rstrip(".")
+    return taken, refused
+
+
 def panels(found: Mapping[str, Runs]) -> list[Panel]:
     """Of every reach: the share of steps within a time, and the least distance of any pair after every step."""
     drawn = []
@@ -175,20 +189,33 @@ def panels(found: Mapping[str, Runs]) -> list[Panel]:
     return drawn
 
 
-def step_report(spent: Sequence[Row], judged: Sequence[Row], facts: Mapping[str, str], notes: Sequence[str]) -> str:
-    """The tables of the tracking steps."""
+def step_report(
+    spent: Sequence[Row], judged: Sequence[Row], facts: Mapping[str, str], figures: bool, notes: Sequence[str]
+) -> str:
+    """The tables of the tracking steps; `figures` says whether reaches are of figures from files."""
     about = texts()["step"].format(
-        dt_ms=1e3 * SETTING.dt, turn=TURN, block=BLOCK, clearance_mm=1e3 * SETTING.clearance,
-        within_mm=1e3 * SETTING.within, joint_speed=SETTING.joint_speed, root_speed=SETTING.root_speed,
-        root_turn=SETTING.root_turn, least=LEAST,
+        who=texts()["step_figures" if figures else "step_human"], dt_ms=1e3 * SETTING.dt, turn=TURN, block=BLOCK,
+        clearance_mm=1e3 * SETTING.clearance, within_mm=1e3 * SETTING.within, joint_speed=SETTING.joint_speed,
+        root_speed=SETTING.root_speed, root_turn=SETTING.root_turn, least=LEAST,
     )  # fmt: skip
     met = [row for row in judged if not row.case.endswith("alone")]  # where something is in the way
-    tables = {
-        "Time of a step": across(spent, "median µs", f"median × {REFERENCE}"),
-        "Its 95 %, and its ratio to calls of C++": across(spent, f"p95 × {REFERENCE}", f"median × {LEAST}"),
-        "What the steps achieve": only(
-            met, "final error mm", "least distance mm", "steps inside", "mean error mm", "foot drift mm",
-            "joint acceleration rad/s²",
-        ),
-    }  # fmt: skip
+    figures_of_time = "median µs", f"median × {REFERENCE}", f"p95 × {REFERENCE}", f"median × {LEAST}"
+    figures_of_steps = (
+        "least distance mm",
+        "steps inside",
+        "mean error mm",
+        "foot drift mm",
+        "joint acceleration rad/s²",
+    )
+    if figures:  # of several figures: tables with fewer columns
+        tables = {
+            "Time of a step": across(spent, *figures_of_time[:2], columns="tool"),
+            "What the steps achieve": only(met, *figures_of_steps[:3]),
+        }
+    else:
+        tables = {
+            "Time of a step": across(spent, *figures_of_time[:2]),
+            "Its 95 %, and its ratio to calls of C++": across(spent, *figures_of_time[2:]),
+            "What the steps achieve": only(met, "final error mm", *figures_of_steps),
+        }
     return report(about, tables, facts, notes)

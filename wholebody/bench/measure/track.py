@@ -7,7 +7,9 @@ believed, ours included.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +21,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+from wholebody.figures.self_pairs import random_postures
 
 VARIANTS = ("free", "contact", "alone")
 
@@ -38,6 +41,11 @@ class Track:
     tip: str = "right_index_tip"
     feet: tuple[str, ...] = ("left_foot", "right_foot")
     clearance: float = SETTING.clearance
+
+    @property
+    def floating(self) -> bool:
+        """Whether the root moves."""
+        return self.scene.figure.root == "free"
 
     @property
     def pairs(self) -> int:
@@ -91,24 +99,31 @@ def smooth_way(places: Array, steps: int) -> Array:
 def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
     """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
     scene.add(wb.Box(tuple(given.block_m)), name="block", at=given.block_at_m)
-    taken = Occupied(scene.figure, (start,))
-    kinds = ["box"] * (given.boxes - 1) + ["sphere"] * given.spheres + ["hull"] * given.hulls
-    taken.keep_free(way[::8], given.room_way_m - given.room_start_m)
+    put_objects(scene, Occupied(scene.figure, (start,)), way, rng, given.space_m)
+
+
+def put_objects(
+    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]],
+    size: float = 1.0, boxes: int = 6,
+) -> None:  # fmt: skip
+    """Put boxes, spheres and hulls, scaled by `size`, into a space (2, 3) [m], clear of what is there and a way."""
+    kinds = ["box"] * boxes + ["sphere"] * given.spheres + ["hull"] * given.hulls
+    taken.keep_free(way[::8], size * (given.room_way_m - given.room_start_m))
 
     def make(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
-        return kinds[number], _shape(kinds[number], rng)
+        return kinds[number], _shape(kinds[number], rng, size)
 
-    add_things(scene, len(kinds), taken, given.room_start_m, rng, given.space_m, make)
+    add_things(scene, len(kinds), taken, size * given.room_start_m, rng, space, make)
 
 
-def _shape(kind: str, rng: np.random.Generator) -> wb.Shape:
+def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
     if kind == "box":
-        edges = rng.uniform(0.06, 0.28, 3)
+        edges = size * rng.uniform(0.06, 0.28, 3)
         return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
     if kind == "sphere":
-        return wb.Sphere(float(rng.uniform(0.04, 0.12)))
+        return wb.Sphere(size * float(rng.uniform(0.04, 0.12)))
     points = rng.normal(size=(100, 3))
-    points *= rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
+    points *= size * rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
     return wb.Hull(points)
 
 
@@ -154,7 +169,7 @@ def judge(track: Track, postures: Array) -> Verdict:
             turn.append(float(np.linalg.norm(pin.log3(moved.rotation))))
     whole = np.vstack([track.start, postures])
     speed = np.abs(velocities(scene.model, whole, SETTING.dt)).max(axis=0)
-    root, joints = np.split(speed, [6])
+    root, joints = np.split(speed, [6 if track.floating else 0])
     angles = np.vstack([track.start, whole])[:, figure.limits.idx_q]
     return Verdict(
         np.array(least), np.array(near), np.array(touching), np.array(error), max(drift), max(turn),
@@ -164,3 +179,85 @@ def judge(track: Track, postures: Array) -> Verdict:
         ),
         float(np.abs(np.diff(angles, 2, axis=0)).mean()) / SETTING.dt**2,
     )  # fmt: skip
+
+
+def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
+    """Build the reaches of a figure, by name or path; pairs keep half of the least distance if that is less."""
+    figure = wb.load(spec)
+    chains = [chain for chain in figure.chains.values() if chain.joints]
+    if not chains:
+        raise InputError(f"{spec}: it has no chain of joints with a tip that could reach; give a figure that moves")
+    chain = max(chains, key=lambda chain: len(chain.joints))
+    dofs = sorted({dof for name in chain.joints for dof in figure.dofs([name]).tolist()})
+    paths, distance = _ways(figure, spec, dofs, steps)
+    clearance = min(SETTING.clearance, 0.5 * distance)
+    held = (str(figure.segments[0]),) if figure.root == "free" else ()
+    places = tuple(np.array([figure.placement(q, chain.tip).translation for q in way]) for way in paths)
+    tracks = []
+    for name in VARIANTS:
+        scene = wb.Scene(figure)
+        contact = name == "contact"
+        if name != "alone":
+            _furnish(scene, paths, places, block=contact)
+        label = f"{Path(spec).stem}, {name}"
+        tracks.append(Track(label, scene, figure.neutral, places[contact], chain.tip, held, clearance))
+    return tracks
+
+
+def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tuple[tuple[Array, Array], float]:
+    """Postures (steps, nq) through two random ones, and those to the first and back; the figure's least distance."""
+    scene, start, still = wb.Scene(figure), figure.neutral, np.zeros(figure.model.nv)
+    random = random_postures(figure.model, 2 * given.candidates, given.seed).reshape(given.candidates, 2, -1)
+    for share in given.shares:
+        for pair in random:
+            moves = np.zeros((2, figure.model.nv))
+            for move, q in zip(moves, pair, strict=True):
+                move[dofs] = pin.difference(figure.model, start, q)[dofs]
+                # A joint moves by 1 rad or m at most to each posture: a way of two seconds keeps the speed bound.
+                move *= share * min(1.0, 1.0 / max(float(np.abs(move).max()), 1e-12))
+            there, back = (
+                np.array([pin.integrate(figure.model, start, move) for move in smooth_way(np.vstack(places), steps)])
+                for places in ((still, *moves), (still, moves[0], still))
+            )
+            tested = max(1, steps // 50)  # postures along a way that are tested for being free
+            least = _least(scene, np.vstack([start, there[::tested], there[-1:], back[::tested]]))
+            if least > given.own_room_m:
+                return (there, back), least
+    raise InputError(f"{spec}: no way was found along which it stays free of itself; give another figure")
+
+
+def _least(scene: wb.Scene, q: Array) -> float:
+    """Least distance of any pair at postures (n, nq) up to the first that is not free, at most twice the clearance."""
+    least: float = 2.0 * SETTING.clearance
+    for posture in q:
+        if least > given.own_room_m and len(scene.geometry.collisionPairs):
+            least = float(scene.contacts(posture, within=least).distance.min(initial=least))
+    return least
+
+
+def _furnish(scene: wb.Scene, paths: tuple[Array, Array], places: Sequence[Array], block: bool) -> None:
+    """Put the objects clear of both paths, and a block about where the second one takes the tip farthest."""
+    # Objects are put clear of twelve postures along each way.
+    taken = Occupied(scene.figure, np.vstack([way[:: max(1, len(way) // 12)] for way in paths]))
+    tips = np.vstack(places)
+    occupied = np.vstack([taken.centres, tips])
+    low, high = occupied.min(axis=0), occupied.max(axis=0)
+    # The objects of the standing human surround 2 m; those of a figure are scaled with its own size.
+    size = float((high - low).max()) / 2.0
+    if block:
+        _add_block(scene, places[1], size)
+    space = (low - size * given.room_space_m).tolist(), (high + size * given.room_space_m).tolist()
+    put_objects(scene, taken, tips, np.random.default_rng(given.seed), space, size, given.boxes - block)
+
+
+def _add_block(scene: wb.Scene, places: Array, size: float) -> None:
+    """Put a box about the place of the tip that is farthest from the first, as large as leaves the start free."""
+    standing, edges = Occupied(scene.figure, (scene.figure.neutral,)), size * np.array(given.block_m)
+    at = places[np.argmax(np.linalg.norm(places - places[0], axis=1))]
+    for share in given.shares:
+        x, y, z = (share * edges).tolist()
+        box = wb.Box((x, y, z))
+        if standing.clear_of(box, (*at.tolist(),), size * given.room_start_m):
+            scene.add(box, name="block", at=tuple(at.tolist()))
+            return
+    raise InputError(f"{scene.figure.name}: a block at the end of its way would touch it where it starts")

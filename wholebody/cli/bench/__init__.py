@@ -92,7 +92,9 @@ leaderboard: a page with tables, charts and sentences that say what to choose wh
         measuring(
             "step",
             "one step of tracking by every tool",
-            "The same 200-step reach by every installed tool, interleaved, judged independently.",
+            "The same 200-step reach by every installed tool, interleaved, judged independently. With --figure these "
+            "figures replace the standing human; tools that do not take one say why.",
+            listed("--figure", "URDF or MJCF files, or names of figures", "FILE"),
             count("--repeats", 5, "timed runs of every tool"),
             whole("--steps", "N", "of each run (default: 200)", default=200),
             listed("--tools", "only these (default: all that are installed)"),

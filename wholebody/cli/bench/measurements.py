@@ -14,7 +14,7 @@ from wholebody.bench.measure import motion, scaling, step
 from wholebody.bench.measure.clips import TOOLS, compare, totals
 from wholebody.bench.measure.files import read
 from wholebody.bench.measure.motion import EQUIPMENT, SYNTHETIC, recorded, recordings, synthetic
-from wholebody.bench.measure.track import VARIANTS, track
+from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
 from wholebody.bench.measure.world import ENGINES, drops, installed, measure
 from wholebody.bench.rows import Panel, Row, across, chart, in_words, only, report, texts
 from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
@@ -40,18 +40,24 @@ def measure_step(arguments: argparse.Namespace) -> None:
     tools = chosen_tools(arguments.tools)
     repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
     facts = machine() | {"steps": str(steps), "repeats": str(repeats)}
-    tracks = {name: track(name, steps) for name in VARIANTS}
+    figures = arguments.figure
+    courses = [course for spec in figures or () for course in figure_tracks(spec, steps)]
+    tracks = {course.name: course for course in courses or (track(name, steps) for name in VARIANTS)}
     runs: dict[str, step.Runs] = {}
     notes = [line for name in tools for line in tool_differences(name)]
     spent, judged = list[Row](), list[Row]()
     for name, course in tracks.items():
-        print(f"{name}: {course.pairs} pairs that can touch, tools {', '.join(tools)}")
-        runs[name] = step.measure(course, tools, repeats, print)
+        taken, refused = step.taking(course, tools) if figures else (list(tools), {})
+        print(f"{name}: {course.pairs} pairs that can touch, tools {', '.join(taken)}")
+        notes += [f"{tool} does not take {name}: {sentence}" for tool, sentence in refused.items()]
+        runs[name] = step.measure(course, taken, repeats, print) if taken else {}
         spent += step.time_rows(course, runs[name])
         judged += step.result_rows(course, runs[name])
-    rows = {"step-time": spent, "step-result": judged}
-    charts = _charts("step", step.panels(runs), "Share of steps within a time, and least distance of any pair")
-    publish("step", step.step_report(spent, judged, facts, notes), arguments, facts=facts, tables=rows, charts=charts)
+    name = "step-figures" if figures else "step"
+    text = step.step_report(spent, judged, facts, bool(figures), notes)
+    rows = {f"{name}-time": spent, f"{name}-result": judged}
+    charts = _charts(name, step.panels(runs), "Share of steps within a time, and least distance of any pair")
+    publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
 
 
 def measure_scaling(arguments: argparse.Namespace) -> None:

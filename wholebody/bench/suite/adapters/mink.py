@@ -196,8 +196,9 @@ class MinkTool(TaskTool):
         )
         self._pairs = len(apart.geom_id_pairs)
         speeds = mink.VelocityLimit(model, dict.fromkeys(figure.joints, SETTING.joint_speed))
-        root = _root_limit(mink, model, SETTING.root_speed, SETTING.root_turn)
-        limits = [mink.ConfigurationLimit(model), speeds, apart, root]
+        limits = [mink.ConfigurationLimit(model), speeds, apart]
+        if track.floating:
+            limits.append(_root_limit(mink, model, SETTING.root_speed, SETTING.root_turn))
         self._kept = {"limits": limits, "constraints": self._feet or None}
 
     def reset(self, q: Array) -> None:

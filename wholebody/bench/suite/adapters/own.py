@@ -111,7 +111,8 @@ class MovingPoint(Goal):
 
 def reach_problem(track: Track, goal: Goal) -> wb.Problem:
     """The problem of a reach with its feet and bounds on speed."""
-    bound = wb.tasks.StepLimit(SETTING.joint_speed, root_velocity=SETTING.root_speed, root_turn=SETTING.root_turn)
+    speed, turn = (SETTING.root_speed, SETTING.root_turn) if track.floating else (np.inf, np.inf)
+    bound = wb.tasks.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
     kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
     # the other tools cannot be told of what a person keeps
     return wb.Problem(

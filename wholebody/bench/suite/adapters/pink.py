@@ -156,11 +156,13 @@ class PinkTool(TaskTool):
         self._model = track.scene.model.copy()
         self._geometry = settled(self._model, track.scene.geometry, track.start)
         self._model.velocityLimit = np.full(self._model.nv, SETTING.joint_speed)
-        _bound_root(self._model, SETTING.root_speed, SETTING.root_turn)
+        if track.floating:
+            _bound_root(self._model, SETTING.root_speed, SETTING.root_turn)
         self.begin(track)
+        pairs = min(NEAREST, track.pairs)
         # Half of what is free of a gap may be used up in one step.
-        barrier = SelfCollisionBarrier(NEAREST, gain=0.5 / SETTING.dt, d_min=track.clearance)
-        self._kept = {"barriers": [barrier], "constraints": self._feet, "safety_break": False}
+        barrier = SelfCollisionBarrier(pairs, gain=0.5 / SETTING.dt, d_min=track.clearance) if pairs else None
+        self._kept = {"barriers": [barrier] if pairs else [], "constraints": self._feet, "safety_break": False}
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""

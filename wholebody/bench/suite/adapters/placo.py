@@ -51,7 +51,8 @@ class PlacoTool(Tool):
         self.reset(track.start)
 
         self._solver = placo.KinematicsSolver(wrapper)
-        self._solver.mask_fbase(False)
+        self._solver.mask_fbase(not track.floating)
+        self._robot.couple(self._solver)
         self._solver.dt = SETTING.dt
         self._solver.enable_joint_limits(True)
         self._solver.enable_velocity_limits(True)
@@ -65,9 +66,10 @@ class PlacoTool(Tool):
         posture.set_joints({self._robot.joint_name(figure.joint_id(name)): value for name, value in values.items()})
         posture.configure("posture", "soft", SETTING.posture_cost**2)
         self._solver.add_regularization_task(SETTING.posture_cost**2)
-        apart = self._solver.add_avoid_self_collisions_constraint()
-        apart.self_collisions_margin, apart.self_collisions_trigger = track.clearance, SETTING.within
-        apart.configure("apart", "hard", 1.0)
+        if track.pairs:
+            apart = self._solver.add_avoid_self_collisions_constraint()
+            apart.self_collisions_margin, apart.self_collisions_trigger = track.clearance, SETTING.within
+            apart.configure("apart", "hard", 1.0)
 
     def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
         """The pairs of pieces that it is given: all of the scene."""
