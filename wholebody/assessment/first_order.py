@@ -113,13 +113,13 @@ class FirstOrder:
             pull = np.zeros(state.model.nv)
             pull += sum(root * each @ (root * jacobian) for root, (each, jacobian) in zip(roots, rows, strict=True))
             active = _active(self._asked, state, self._beside, max(ACTIVE, self._within))
-            _, way = _balanced(pull, active.signed, active.one_sided)
-            led = [root * jacobian @ way for root, (_, jacobian) in zip(roots, rows, strict=True)]
+            _, direction = _balanced(pull, active.signed, active.one_sided)
+            led = [root * jacobian @ direction for root, (_, jacobian) in zip(roots, rows, strict=True)]
         led = np.concatenate([np.zeros(1), *led])
         bends = float(led @ led)
-        if not bends or np.linalg.norm(way) <= INDEPENDENT * np.linalg.norm(pull):  # what rounding leaves
+        if not bends or np.linalg.norm(direction) <= INDEPENDENT * np.linalg.norm(pull):  # what rounding leaves
             return 1.0
-        length = min(float(error @ led) / bends, 1.0 / float(np.abs(way).max()))
+        length = min(float(error @ led) / bends, 1.0 / float(np.abs(direction).max()))
         return float(np.linalg.norm(error - length * led) / np.linalg.norm(error))
 
     @cached_property
@@ -289,8 +289,8 @@ def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tupl
         for _ in range(int(passive.sum())):  # each time at least one row leaves
             if trial is None or not (falling := passive & (trial <= 0.0)).any():
                 break
-            part, way = np.full(len(rows), np.inf), share[falling] - trial[falling]
-            part[falling] = share[falling] / np.where(way > 0.0, way, 1.0)  # 0 for a share that is 0 and stays 0
+            part, fall = np.full(len(rows), np.inf), share[falling] - trial[falling]
+            part[falling] = share[falling] / np.where(fall > 0.0, fall, 1.0)  # 0 for a share that is 0 and stays 0
             share += part.min() * (trial - share)
             passive[part <= part.min()] = False
             share[~passive] = 0.0

@@ -109,7 +109,7 @@ def frames_passed_through(
             frame
             for frame, (before, after) in enumerate(pairwise(q), start=1)
             if scene.sweep(
-                before, after, depth, moves={name: (way[frame - 1], way[frame]) for name, way in moves.items()}
+                before, after, depth, moves={name: (path[frame - 1], path[frame]) for name, path in moves.items()}
             )
             is not None
         )
@@ -120,11 +120,11 @@ def frames_passed_through(
 def deepened(scene: Scene, q: Array) -> Array:
     """(n - 1,) least of `DEPTHS` [m] that no pair deepens by between two postures (n, nq), swept from either end."""
     sweep, found = Sweep(scene.model, scene.geometry, scene.pair_table), []
-    for way in pairwise(q):
+    for path in pairwise(q):
         free = (
             depth
             for depth in DEPTHS
-            if any(sweep.first_contact(*ends, tolerance=depth) is None for ends in (way, way[::-1]))
+            if any(sweep.first_contact(*ends, tolerance=depth) is None for ends in (path, path[::-1]))
         )
         found.append(next(free, np.inf))
     return np.array(found)

@@ -94,14 +94,14 @@ def way_out(
     flat = spread - np.outer(spread @ normal, normal)
     single, shortest, length = SinglePairs(geometry), None, FARTHEST
     for direction in np.vstack([spread, flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-9)[:, None]]):
-        way = 0.0
-        while way < length and direction.any():
+        moved_by = 0.0
+        while moved_by < length and direction.any():
             there = placements.copy()
-            there[moved, 3] += way * direction
+            there[moved, 3] += moved_by * direction
             deepest = -float(single.measured(there, pairs)[:, 0].min())
             if deepest <= COAL_ACCURACY:
-                shortest, length = way * direction, way
-            way += max(deepest, SHORTEST)
+                shortest, length = moved_by * direction, moved_by
+            moved_by += max(deepest, SHORTEST)
     return shortest
 
 

@@ -144,8 +144,8 @@ def bound_from_below(results: Array, index: Indices, known: tuple[Indices, Array
     pairs, travelled, bound = known
     for p in index:
         distance = results[p, RESULT_FIRST]
-        way = travelled[pairs[p, 0]] + travelled[pairs[p, 1]]
-        bound[0, p] = distance - 10.0 * COAL_ACCURACY * (1.0 + abs(distance)) + way
+        approach = travelled[pairs[p, 0]] + travelled[pairs[p, 1]]
+        bound[0, p] = distance - 10.0 * COAL_ACCURACY * (1.0 + abs(distance)) + approach
     for p in range(len(pairs)):
         least[p] = bound[0, p] - travelled[pairs[p, 0]] - travelled[pairs[p, 1]]
     for p in index:
@@ -229,13 +229,13 @@ def _look_at(
     pairs, reach, _, _, travelled, bound, extent, marks = known
     for p in range(begin, end):
         a, b = pairs[p, 0], pairs[p, 1]
-        way = travelled[a] + travelled[b]
+        approach = travelled[a] + travelled[b]
         near = min(within, most[p])
-        if bound[0, p] - way >= near:
+        if bound[0, p] - approach >= near:
             continue
         gap = outer_gap(placement, reach, extent, a, b)
         if gap >= near:
-            bound[0, p] = gap + way
+            bound[0, p] = gap + approach
             continue
         marks[0, count] = p
         count += 1

@@ -106,17 +106,17 @@ class _Descent(Iteration):
         """None."""
         return 0.0
 
-    def moved(self, way: Array) -> Array:
-        """Where a way (nv,), or a half of it or less, leads; StepError if a term is not finite on all of it."""
+    def moved(self, step: Array) -> Array:
+        """Where a step (nv,), or a half of it or less, leads; StepError if a term is not finite on all of it."""
         problem = self.problem
         asked = (*problem.goals, *problem.stated, *problem.bounds, *problem.measures)
         for _ in range(12):
-            moved = super().moved(way)
+            moved = super().moved(step)
             error = undefined(asked, self.state.update(moved))
             if error is None:
                 return moved
             self.control.step_back(error)
-            way = 0.5 * way
+            step = 0.5 * step
         raise StepError(str(error))
 
 

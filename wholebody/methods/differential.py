@@ -56,8 +56,8 @@ def held(problem: Problem, state: State, q: Array, tolerance: float) -> Array:
         missed = np.concatenate([value - term.lower for term, value, _ in found])
         if not np.abs(missed).max() > tolerance:
             break
-        way = np.linalg.lstsq(np.concatenate([rows for *_, rows in found]), -missed, rcond=1e-6)[0]
-        q = problem.scene.figure.clamp(np.asarray(pin.integrate(state.model, q, way)))
+        step = np.linalg.lstsq(np.concatenate([rows for *_, rows in found]), -missed, rcond=1e-6)[0]
+        q = problem.scene.figure.clamp(np.asarray(pin.integrate(state.model, q, step)))
     return q
 
 
@@ -156,9 +156,9 @@ class Iteration:
         self._last = move
         return move
 
-    def moved(self, way: Array) -> Array:
-        """Where a way (nv,) leads, within limits; `StepError` if nowhere."""
-        return self.problem.scene.figure.clamp(np.asarray(pin.integrate(self.problem.scene.model, self.q, way)))
+    def moved(self, step: Array) -> Array:
+        """Where a step (nv,) leads, within limits; `StepError` if nowhere."""
+        return self.problem.scene.figure.clamp(np.asarray(pin.integrate(self.problem.scene.model, self.q, step)))
 
     def clearance_violation(self, q: Array) -> float:
         """By what the worst pair is nearer than its clearance at a posture (nq,) [m]."""

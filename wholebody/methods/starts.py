@@ -184,8 +184,8 @@ def seated(problem: Problem, state: State, start: Array, ahead: float = 0.0, arm
         reaching = _reaching(problem, start, body)
         moves.append([])
         for turn in HEADINGS:
-            way = axes[:2] @ turn.rotation[:, 0]
-            edge = ahead * (over.high[:2] / np.maximum(np.abs(way), 1e-9)).min() * way @ axes[:2]
+            heading = axes[:2] @ turn.rotation[:, 0]
+            edge = ahead * (over.high[:2] / np.maximum(np.abs(heading), 1e-9)).min() * heading @ axes[:2]
             root = pin.SE3(np.eye(3), at + edge) * turn * pin.SE3(np.eye(3), -pelvis.translation) * usual
             moves[-1].append(_to_posture(problem, start, body, "sitting", root))
             moves[-1][-1][reaching] = pin.difference(figure.model, start, figure.posture(f"{body}{arms}"))[reaching]

@@ -125,7 +125,7 @@ class _Gaps:
         # of each gap its pairs by number, and 1 where they are the same way, else -1
         self._slots = list[tuple[Indices, Array]]()
         for gap in gaps:
-            numbers, ways = list[int](), list[float]()
+            numbers, signs = list[int](), list[float]()
             for one in gap.first.pieces:
                 for other in gap.second.pieces:
                     key = min(one, other), max(one, other)
@@ -133,8 +133,8 @@ class _Gaps:
                         pairs[key] = len(pairs)
                         geometry.addCollisionPair(pin.CollisionPair(*key))
                     numbers.append(pairs[key])
-                    ways.append(1.0 if one < other else -1.0)
-            self._slots.append((np.array(numbers, dtype=np.intp), np.array(ways)))
+                    signs.append(1.0 if one < other else -1.0)
+            self._slots.append((np.array(numbers, dtype=np.intp), np.array(signs)))
         self._proximity = Proximity(PairTable(workspace.model, geometry, swept=workspace.table.swept))
         self._joint = workspace.table.joint
         self._apart, self._row = np.empty(len(pairs)), np.empty(len(pairs), dtype=np.intp)
@@ -146,15 +146,15 @@ class _Gaps:
         near, apart, row = self._proximity.query_views(state.data, TOUCHING), self._apart, self._row
         apart[:] = np.inf
         apart[near.number], row[near.number] = near.distance, np.arange(len(near.number))
-        for number, (pairs, ways) in enumerate(self._slots):
+        for number, (pairs, signs) in enumerate(self._slots):
             least = int(apart[pairs].argmin())
             if apart[pairs[least]] == np.inf:
                 near = self._proximity.query_views(state.data, ENDLESS)
                 apart[near.number], row[near.number] = near.distance, np.arange(len(near.number))
                 least = int(apart[pairs].argmin())
-            at, way = row[pairs[least]], ways[least]
-            first, second = near.pair[at] if way > 0.0 else near.pair[at][::-1]
-            distance[number], wrench[number, :3] = near.distance[at], way * near.normal[at]
+            at, sign = row[pairs[least]], signs[least]
+            first, second = near.pair[at] if sign > 0.0 else near.pair[at][::-1]
+            distance[number], wrench[number, :3] = near.distance[at], sign * near.normal[at]
             wrench[number, 3:] = cross(0.5 * (near.point_a[at] + near.point_b[at]), wrench[number, :3])
             joints[:, number] = self._joint[second], self._joint[first]
         return distance, wrench, (joints[0], joints[1])

@@ -183,9 +183,9 @@ class _Known:
 
     def difference(self, one: Array, other: Array) -> float:
         """Greatest difference of two postures (nq,) in a degree of freedom; a whole turn of a hinge is none."""
-        way = np.asarray(pin.difference(self._model, one, other))
-        way[self._hinges] -= 2.0 * np.pi * np.round(way[self._hinges] / (2.0 * np.pi))
-        return float(np.abs(way).max(initial=0.0))
+        away = np.asarray(pin.difference(self._model, one, other))
+        away[self._hinges] -= 2.0 * np.pi * np.round(away[self._hinges] / (2.0 * np.pi))
+        return float(np.abs(away).max(initial=0.0))
 
     def near(self, q: Array) -> Solution | None:
         """The first answer that is not apart from a posture (nq,); None where all are."""

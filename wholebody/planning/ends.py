@@ -53,8 +53,8 @@ def nearer(problem: Problem, path: list[Array], local: LocalPlanner, sampler: Sa
         end = sampler.turned(solution.q, path[place])
         if solution.solved and meets(assess(problem, end), QP().tolerance):
             # m, rad: the motion to a nearer end is shorter
-            way = local.joined(path[place], end, 0.98 * length(model, path[place:]))
-            path = [*path[: place + 1], *way] if way else path
+            shorter = local.joined(path[place], end, 0.98 * length(model, path[place:]))
+            path = [*path[: place + 1], *shorter] if shorter else path
     return path
 
 

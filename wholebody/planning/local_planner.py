@@ -144,17 +144,17 @@ class Geodesics:
 
     def towards(self, q: Array, target: Array) -> tuple[list[Array], bool]:
         """Postures (nq,) of the motion from q towards a target (nq,), without q, and whether it gets there."""
-        motion, way = np.asarray(pin.difference(self._model, q, target)), list[Array]()
+        motion, postures = np.asarray(pin.difference(self._model, q, target)), list[Array]()
         parts, seen, here = self._parts(motion), None, q
         for part in range(1, parts + 1):
             there = target if part == parts else np.asarray(pin.integrate(self._model, q, part / parts * motion))
             ahead = self._seen(there)  # most motions end here, so q is looked at afterwards
             seen = self._seen(q) if ahead is not None and seen is None else seen
             if not self._joins(here, motion / parts, seen, ahead):
-                return way, False
-            way.append(there)
+                return postures, False
+            postures.append(there)
             here, seen = there, ahead
-        return way, True
+        return postures, True
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """Postures (nq,) of a motion from q to a target (nq,), without q, no longer than `most`; else none."""

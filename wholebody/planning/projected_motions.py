@@ -151,11 +151,11 @@ class ProjectedMotions(Geodesics):
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `Geodesics`."""
-        way, met = self._stepped(q, target, most)
-        return way if met else []
+        postures, met = self._stepped(q, target, most)
+        return postures if met else []
 
     def _stepped(self, q: Array, target: Array, most: float) -> tuple[list[Array], bool]:
-        way, gone = list[Array](), 0.0
+        postures, gone = list[Array](), 0.0
         motion = np.asarray(pin.difference(self._model, q, target))
         left = float(np.linalg.norm(motion))
         while gone + left <= most and not BUDGET.over:
@@ -165,15 +165,15 @@ class ProjectedMotions(Geodesics):
             there = target if last else self._projected(self._along(q, share * motion))
             if there is None or not self._leads(q, there):
                 break
-            way.append(there)
+            postures.append(there)
             if last or share == 1.0:
-                return way, last
+                return postures, last
             gone += float(np.linalg.norm(pin.difference(self._model, q, there)))
             motion, before, q = np.asarray(pin.difference(self._model, there, target)), left, there
             left = float(np.linalg.norm(motion))
             if left > before - 0.1 * share * before:  # what is held does not let it nearer
                 break
-        return way, False
+        return postures, False
 
     def _along(self, q: Array, motion: Array) -> Array:
         """The posture (nq,) after the part of a motion (nv,) that keeps what is held to first order, where it is known.

@@ -91,9 +91,9 @@ class RRTConnect:
     def _extend(self, tree: Tree, target: Array, slides: TrackedMotions | None) -> tuple[int | None, bool]:
         """Add the motion from the nearest posture towards a target; the last of it, and whether it is there."""
         number = tree.nearest(target)
-        way, met = self._local.towards(tree.postures[number], target)
-        if not (way or met) and slides is not None:
-            way = slides.pulled(tree.postures[number], target)
-        for q in way:
+        motion, met = self._local.towards(tree.postures[number], target)
+        if not (motion or met) and slides is not None:
+            motion = slides.pulled(tree.postures[number], target)
+        for q in motion:
             number = tree.add(q, number)
-        return (number if way or met else None), met
+        return (number if motion or met else None), met

@@ -204,9 +204,9 @@ class Search:
         if rng.uniform() < LIMBS:
             return self._sampler.limb(q, figure.dofs(chain.joints))
         *joints, at = (figure.placement(q, name).translation for name in (*chain.joints, chain.tip))
-        way = rng.normal(size=3)
-        way *= rng.uniform() * np.linalg.norm(np.diff([*joints, at], axis=0), axis=1).sum() / np.linalg.norm(way)
-        return local.reaching(q, chain.tip, at + way)
+        offset = rng.normal(size=3)
+        offset *= rng.uniform() * np.linalg.norm(np.diff([*joints, at], axis=0), axis=1).sum() / np.linalg.norm(offset)
+        return local.reaching(q, chain.tip, at + offset)
 
     def _spread(self, samples: int) -> float:
         """Of the next of so many samples; bodies get through most narrow places sooner if the root alone turns."""
@@ -221,16 +221,16 @@ class Search:
         """
         start = self._problem.start
         # steps that a bound of one's own limits may be thousands
-        if self._local is self._slides and (way := self._slides.geodesics.joined(start, end, np.inf)):
+        if self._local is self._slides and (motion := self._slides.geodesics.joined(start, end, np.inf)):
             self._straight = True
-            return [start, *way]
-        way, self._straight = self._local.towards(start, end)
+            return [start, *motion]
+        motion, self._straight = self._local.towards(start, end)
         if self._straight:
-            return [start, *way[:-1], end]
+            return [start, *motion[:-1], end]
         if self._held:  # steps along things found none of 20 ways, and projected ones are sooner
             return []
-        way, met = self._slides.towards(end, start)
-        return [start, *way[-2::-1], end] if met else []
+        motion, met = self._slides.towards(end, start)
+        return [start, *motion[-2::-1], end] if met else []
 
     def _apart(self, q: Array, other: Array) -> float:
         return float(np.linalg.norm(pin.difference(self._problem.scene.model, q, other)))

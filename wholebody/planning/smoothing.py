@@ -35,9 +35,9 @@ def shortcut(
         part = path[first : last + 1]
         most = 0.98 * length(model, part)  # a shortcut is shorter
         alone = partial and failed % 2
-        way = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
-        path = [*path[: first + 1], *way, *path[last + 1 :]] if way else path
-        failed = 0 if way else failed + 1
+        shorter = _evened(model, part, local, rng) if alone else local.joined(path[first], path[last], most)
+        path = [*path[: first + 1], *shorter, *path[last + 1 :]] if shorter else path
+        failed = 0 if shorter else failed + 1
     return path
 
 

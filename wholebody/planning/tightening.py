@@ -75,12 +75,12 @@ def programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, damp
         each = slides.rows(q)
         rows.append(with_values(each, derivative=each.derivative @ turn.T, held=each.held @ turn.T))
         counts.append(len(each.gap))
-    ways = np.array([turn @ pin.difference(model, *pair) for turn, pair in zip(turns, pairwise(band), strict=False)])
-    lengths = np.linalg.norm(ways, axis=1)
+    steps = np.array([turn @ pin.difference(model, *pair) for turn, pair in zip(turns, pairwise(band), strict=False)])
+    lengths = np.linalg.norm(steps, axis=1)
     if not lengths.any():  # it stays
         return None
     weights = lengths.mean() / np.maximum(lengths, 0.3 * lengths.mean())  # bounded where a motion is short
-    pull = weights[1:, None] * ways[1:] - weights[:-1, None] * ways[:-1]
+    pull = weights[1:, None] * steps[1:] - weights[:-1, None] * steps[:-1]
     pull -= HELD * np.array([each.held.T @ each.missed for each in rows])
     # of nodes by those before them, as displacements are eliminated from the start on
     inverses = list[Array]()
@@ -94,7 +94,7 @@ def programmed(model: pin.Model, band: list[Array], slides: TrackedMotions, damp
     # rad, m: farther ones lead to things that no row is of
     away *= min(1.0, 0.4 / max(float(np.linalg.norm(away, axis=1).max()), 1e-15))
     ends = np.zeros((1, model.nv))
-    after = np.linalg.norm(ways + np.diff(np.vstack([ends, away, ends]), axis=0), axis=1)
+    after = np.linalg.norm(steps + np.diff(np.vstack([ends, away, ends]), axis=0), axis=1)
     return Program(away, turns, float(lengths.sum() - after.sum()))
 
 

@@ -108,8 +108,8 @@ def least_time(figure: Figure, path: Sequence[Array], pace: Pace) -> float:
     """Seconds that no motion along a path of postures (nq,) is sooner than, as joints rest where they turn back."""
     most, limit = 0.0, pace.acceleration
     for steps, speed in zip(np.diff(places(figure.model, path), axis=0).T, pace.fastest(figure), strict=True):
-        way = np.sign(steps)
-        runs = np.bincount(np.cumsum(np.diff(way, prepend=way[:1]) != 0.0), np.abs(steps), 1)
+        senses = np.sign(steps)
+        runs = np.bincount(np.cumsum(np.diff(senses, prepend=senses[:1]) != 0.0), np.abs(steps), 1)
         cruised = runs > speed**2 / limit
         most = max(most, float(np.where(cruised, runs / speed + speed / limit, 2.0 * np.sqrt(runs / limit)).sum()))
     return most

@@ -78,10 +78,10 @@ class TrackedMotions:
 
     def joined(self, q: Array, target: Array, most: float) -> list[Array]:
         """See `Geodesics`; a geodesic if it may be, as it costs a tenth of steps."""
-        if way := self.geodesics.joined(q, target, most):
-            return way
-        way, met = self.towards(q, target, most)
-        return [*way[:-1], target] if way and met else []  # steps end beside it, and ends of motions stay
+        if motion := self.geodesics.joined(q, target, most):
+            return motion
+        motion, met = self.towards(q, target, most)
+        return [*motion[:-1], target] if motion and met else []  # steps end beside it, and ends of motions stay
 
     def through(self, path: Array) -> list[Array]:
         """See `Geodesics`."""
@@ -97,7 +97,7 @@ class TrackedMotions:
 
     def _approached(self, q: Array, target: Array, factors: Array, most: float) -> tuple[list[Array], bool]:
         """The motion of `towards` where the shares of freedoms are multiplied by factors (nv,)."""
-        way, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target, factors)
+        motion, left, gone, rest = list[Array](), self._apart(q, target), 0.0, self._rest(q, target, factors)
         self._attraction.weigh(factors**2)
         self._attraction.toward(target)
         while left > REACHED:
@@ -105,9 +105,9 @@ class TrackedMotions:
             left, gone, rest = self._apart(q, target), gone + self._apart(here, q), self._rest(q, target, factors)
             slow = rest > before - self._slow and left > REACHED
             if slow or gone + left > most or BUDGET.over or not self.geodesics.keeps(q):
-                return way, False
-            way.append(q)
-        return way, True
+                return motion, False
+            motion.append(q)
+        return motion, True
 
     def _stepped(self, q: Array) -> Array:
         """The posture (nq,) of one step; of another one, which meets constraints alone, where that misses them."""

@@ -74,15 +74,15 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
     (Chirikjian 2011, section 10.6, in the form of Pinocchio's Jlog6).
     """
     own, change, left, bend = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    angle, way, along = np.empty(3), np.empty(3), np.empty(3)
+    angle, offset, along = np.empty(3), np.empty(3), np.empty(3)
     for e in range(len(targets)):
         row, at, v = places[e, 0], places[e, 1], places[e, 2]
         target = targets[e].reshape((4, 3))
         _rotation(q[at + 3 : at + 7], own)
         for i in range(3):
-            way[i] = 0.0
+            offset[i] = 0.0
             for k in range(3):
-                way[i] += target[i, k] * (q[at + k] - target[3, k])
+                offset[i] += target[i, k] * (q[at + k] - target[3, k])
             for j in range(3):
                 change[i, j] = 0.0
                 for k in range(3):
@@ -90,7 +90,7 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
         rotation_vector(change, angle)
         inverse_left(angle, left)
         for i in range(3):
-            value[row + i] = left[i, 0] * way[0] + left[i, 1] * way[1] + left[i, 2] * way[2]
+            value[row + i] = left[i, 0] * offset[0] + left[i, 1] * offset[1] + left[i, 2] * offset[2]
             value[row + 3 + i] = angle[i]
         square = angle[0] ** 2 + angle[1] ** 2 + angle[2] ** 2
         size = np.sqrt(square)
@@ -101,17 +101,17 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
             share = np.sin(size) / size
             beta = 1.0 / square - share * half
             slope = -2.0 / (square * square) + (1.0 + share) * half / square
-        inner = angle[0] * way[0] + angle[1] * way[1] + angle[2] * way[2]
+        inner = angle[0] * offset[0] + angle[1] * offset[1] + angle[2] * offset[2]
         for i in range(3):
-            along[i] = slope * inner * angle[i] - (square * slope + 2.0 * beta) * way[i]
+            along[i] = slope * inner * angle[i] - (square * slope + 2.0 * beta) * offset[i]
         for i in range(3):
             for m in range(3):
-                bend[i, m] = along[i] * angle[m] + beta * angle[i] * way[m]
+                bend[i, m] = along[i] * angle[m] + beta * angle[i] * offset[m]
             bend[i, i] += beta * inner
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            bend[j, i] += 0.5 * way[k]
-            bend[k, i] -= 0.5 * way[j]
+            bend[j, i] += 0.5 * offset[k]
+            bend[k, i] -= 0.5 * offset[j]
         for i in range(3):
             for m in range(3):
                 jacobian[row + i, v + m] = jacobian[row + 3 + i, v + 3 + m] = left[m, i]
@@ -272,20 +272,20 @@ def hangs(table: Table, joints: Array, tree: Carried, measure: Array, squares: A
     tables, entries = table
     columns, column, support = tree
     nv = measure.shape[1] - 1
-    row, at, way, turn = np.empty(nv), np.arange(nv), np.empty(3), np.empty(3)
+    row, at, hanging, turn = np.empty(nv), np.arange(nv), np.empty(3), np.empty(3)
     error, change = np.empty(2), np.empty((2, 3))
     for e in range(len(tables)):
         joint = entries[e, 0]
         for i in range(3):
-            way[i] = 0.0
+            hanging[i] = 0.0
             for k in range(3):
-                way[i] += joints[joint, k, i] * tables[e, 1 + k]
-        equidistant(way[0], way[1], -way[2], error, change)
+                hanging[i] += joints[joint, k, i] * tables[e, 1 + k]
+        equidistant(hanging[0], hanging[1], -hanging[2], error, change)
         for r in range(2):
             change[r, 2] = -change[r, 2]
             for i in range(3):
                 j, k = (i + 1) % 3, (i + 2) % 3
-                turn[i] = way[j] * change[r, k] - way[k] * change[r, j]
+                turn[i] = hanging[j] * change[r, k] - hanging[k] * change[r, j]
             row[:] = 0.0
             for c in range(len(columns)):
                 if support[joint, c]:

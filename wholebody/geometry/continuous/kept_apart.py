@@ -1,4 +1,4 @@
-"""Pairs that keep a distance all along a way, by its two ends; compiled loops."""
+"""Pairs that keep a distance all along a motion, by its two ends; compiled loops."""
 
 from __future__ import annotations
 

@@ -69,17 +69,17 @@ def _far_moved(
     begin, end, kept = part
     for p in range(begin, end):
         first, second = pairs[p, 0], pairs[p, 1]
-        way = motion[first] + motion[second]
-        if way <= widths[p]:
+        travel = motion[first] + motion[second]
+        if travel <= widths[p]:
             continue
         radii = reach[first] + reach[second]
         free_before, free_after = _between(before, first, second) - radii, _between(after, first, second) - radii
-        if way <= widths[p] + max(free_before, 0.0) + max(free_after, 0.0):
+        if travel <= widths[p] + max(free_before, 0.0) + max(free_after, 0.0):
             continue
         room = widths[p]
         room += max(free_before, _apart(near[0], near[1], near[2], p))
         room += max(free_after, _apart(near[3], near[4], near[5], p))
-        if way <= room:
+        if travel <= room:
             continue
         if ARC * seen_motion(before, after, first, second, reach[second]) <= room:
             continue

@@ -257,16 +257,16 @@ class ChainResolver:
         own_origin = own[-1]
         first = limbs.frame(own_origin)
         own += tuple(node for node in inner if self._passes(node, first[9:]))
-        way, square, done, gain = 1.0, sum(part * part for part in push), 0.0, 1.0
+        scale, square, done, gain = 1.0, sum(part * part for part in push), 0.0, 1.0
         for _ in range(LONGER):
             origin = three(limbs.frames[own_origin, 9:])
-            self._reach_out(inner[0], inner, origin, (way * push[0], way * push[1], way * push[2]))
+            self._reach_out(inner[0], inner, origin, (scale * push[0], scale * push[1], scale * push[2]))
             moved = np.subtract(limbs.frame(own_origin)[9:], first[9:])
             before, done = done, float(moved @ push) / square
-            gain = (done - before) / way
+            gain = (done - before) / scale
             if done > 0.9 or gain < 0.05:
                 break
-            way = (1.0 - done) / gain
+            scale = (1.0 - done) / gain
         aims = Aims(limbs, [link.node] * 3, np.eye(3), there, [False] * 3)
         plan = aims.plan(own)
         for _ in range(SWEEPS):

@@ -84,17 +84,17 @@ class Attraction:
 
     def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
         """Move all parts that are not settled a step to the wanted posture; (nq,) and shares (parts,), or None."""
-        way = np.asarray(pin.difference(self._model, q, wanted))
+        motion = np.asarray(pin.difference(self._model, q, wanted))
         shares = np.zeros(len(self.parts))
         for k, (dofs, reach) in enumerate(self.parts):
-            part = way[dofs]
+            part = motion[dofs]
             length = float(np.abs(part) @ reach)
             if not settled[k] and float(part @ part) >= 1e-12:  # rad^2: it has not arrived
                 shares[k] = min(1.0, self._most / length)
-            way[dofs] = part * shares[k]
+            motion[dofs] = part * shares[k]
         if not shares.any():
             return None
-        return np.asarray(pin.integrate(self._model, q, way)), shares
+        return np.asarray(pin.integrate(self._model, q, motion)), shares
 
     def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
         """Undo changes that moved a part no nearer to the wanted posture; then move joints of blocked parts singly."""
@@ -110,8 +110,8 @@ class Attraction:
             if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
                 slow.append(k)
         if back.any():
-            way = np.asarray(pin.difference(self._model, trial, q))
-            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
+            motion = np.asarray(pin.difference(self._model, trial, q))
+            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, motion, 0.0)))
             if not self._resolver.query(kept):
                 trial = kept
         for k in slow:
@@ -129,11 +129,11 @@ class Attraction:
         for dof, reach in zip(*self.parts[part], strict=True):
             if dof in held:  # it would turn a link that was moved out by translation
                 continue
-            way = float(pin.difference(self._model, q, wanted)[dof])
-            if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
+            motion = float(pin.difference(self._model, q, wanted)[dof])
+            if motion * motion < LEAST_GAIN or self._resolver.counts.work > self.limit:
                 continue
             step = np.zeros(self._model.nv)
-            step[dof] = min(max(way, -self._most / reach), self._most / reach)
+            step[dof] = min(max(motion, -self._most / reach), self._most / reach)
             trial = np.asarray(pin.integrate(self._model, q, step))
             if not self._resolver.query(trial):
                 q, gained = trial, True
@@ -192,16 +192,16 @@ class FrameResolver:
             if shown is not None:
                 return shown
         attraction.limit = resolver.counts.work + BUDGET + OVERRUN
-        way = self._approach(q, wanted, before, rng)
-        chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
-        found = (self._toward(q, way[k]) for k in chosen)
+        path = self._approach(q, wanted, before, rng)
+        chosen = dict.fromkeys((len(path) - 1, len(path) // 2, 0)) if path else ()
+        found = (self._toward(q, path[k]) for k in chosen)
         return next((made for made in found if made is not None), None)
 
     def _approach(self, q: Array, wanted: Array, before: QueryResult, rng: np.random.Generator) -> list[Array]:
         """Steps from a free posture towards the wanted one; returns the postures."""
         resolver = self._resolver
         settled = [False] * len(self._parts)
-        way = []
+        path = []
         for _ in range(8):
             if resolver.counts.work > self._attraction.limit - OVERRUN:
                 break
@@ -216,19 +216,19 @@ class FrameResolver:
             if self._passes_through(before, q, trial):
                 trial = self._interpolate(q, self._hit)
             q = self._attraction.keep_gains(q, trial, wanted, moved[1], settled)
-            way.append(q)
+            path.append(q)
             before = self._resolver.placed
-        return way
+        return path
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
         """The direct motion from q0 towards q1, by each part's share or by the least share; None if it is not free."""
-        way = np.asarray(pin.difference(self._model, q0, q1))
-        shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))
+        motion = np.asarray(pin.difference(self._model, q0, q1))
+        shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(motion), 1e-12))
         for dofs, _ in self._parts:
             shares[dofs] = shares[dofs].min(initial=1.0)
         least = float(shares.min())
         for share in (shares, least) if least < 1.0 else (1.0,):
-            q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
+            q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * motion)))
             q = self._resolver.into_cones(q)
             overlaps, sweep = self._resolver.query(q), self._workspace.sweep
             # m: twice the allowed depth of the direct motion from one shown posture to the next

@@ -63,9 +63,9 @@ class OnSurface(Batch):
     def _local(self, x: Array) -> tuple[Array, Array]:
         """(k, 3) the points in the surfaces' axes, and from the first body's origin to them in the world."""
         a, b = x[self.bodies[:, 0]], x[self.bodies[:, 1]]
-        way = b[:, PLACE] + quat.rotate(b[:, TURN], self.points) - a[:, PLACE]
-        inside = quat.rotate(quat.conjugate(a[:, TURN]), way) - self.centers
-        return np.einsum("kji,kj->ki", self.turns, inside), way
+        offset = b[:, PLACE] + quat.rotate(b[:, TURN], self.points) - a[:, PLACE]
+        inside = quat.rotate(quat.conjugate(a[:, TURN]), offset) - self.centers
+        return np.einsum("kji,kj->ki", self.turns, inside), offset
 
     def residual(self, x: Array) -> Array:  # noqa: D102
         local, _ = self._local(x)
@@ -75,7 +75,7 @@ class OnSurface(Batch):
         return result
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
-        local, way = self._local(x)
+        local, offset = self._local(x)
         beyond, sign = np.abs(local) - self.half, np.where(local < 0.0, -1.0, 1.0)
         out = np.maximum(beyond, 0.0)
         length = np.linalg.norm(out, axis=1)
@@ -88,7 +88,7 @@ class OnSurface(Batch):
         push = quat.rotate(first, normal)
         result = np.zeros((len(self), 1, 14))
         result[:, 0, PLACE], result[:, 0, OTHER_PLACE] = -push, push
-        result[:, 0, TURN] = np.einsum("ki,kij->kj", way, quat.rotate_derivative(first, normal))
+        result[:, 0, TURN] = np.einsum("ki,kij->kj", offset, quat.rotate_derivative(first, normal))
         result[:, 0, OTHER_TURN] = np.einsum("ki,kij->kj", push, quat.rotate_derivative(second, self.points))
         return result
 
@@ -215,9 +215,9 @@ class AssemblyJoints(AssemblyBodies):
         turn_a, turn_b = pin.Quaternion(here_a.rotation), pin.Quaternion(here_b.rotation)
         basis = axes_along(turn_a.inverse() * along)
         held.equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
-        way = turn_a.inverse() * (here_b.translation - here_a.translation)
+        offset = turn_a.inverse() * (here_b.translation - here_a.translation)
         sides = basis.toRotationMatrix().T[:2]
-        held.equations.slide(a, b, what, sides, np.zeros(3), sides @ way)
+        held.equations.slide(a, b, what, sides, np.zeros(3), sides @ offset)
         return self._keep(held)
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Self:

@@ -127,9 +127,9 @@ class AssemblyGoal:
     def error(self, body: Any) -> Array:
         """(6,) metres and radians in the world, from where it is to the target; `body` is the body's placement."""
         here = body * self.local
-        way = np.zeros(3) if self.kind == "orientation" else self.target.translation - here.translation
+        offset = np.zeros(3) if self.kind == "orientation" else self.target.translation - here.translation
         turn = np.zeros(3) if self.kind == "point" else pin.log3(self.target.rotation @ here.rotation.T)
-        return np.concatenate([way, turn])
+        return np.concatenate([offset, turn])
 
     def between(self, body: Any, share: float) -> AssemblyGoal:
         """The goal at a fraction of the path from where it is now to the target."""
@@ -245,9 +245,9 @@ def checked(measure: Measure, scene: Scene, q: Array) -> Measure:
     label = type(measure).__name__
     resolved, state = measure.resolve(scene, q), scene.state(q)
     check_measure("minimise", resolved, state)
-    way = np.random.default_rng(0).normal(size=scene.model.nv)
-    slope = float(resolved.gradient(state) @ way)
-    ends = [resolved.value(state.update(pin.integrate(scene.model, q, step * way))) for step in (1e-6, -1e-6)]
+    direction = np.random.default_rng(0).normal(size=scene.model.nv)
+    slope = float(resolved.gradient(state) @ direction)
+    ends = [resolved.value(state.update(pin.integrate(scene.model, q, step * direction))) for step in (1e-6, -1e-6)]
     difference = (ends[0] - ends[1]) / 2e-6
     if not abs(slope - difference) <= 1e-4 * max(1.0, abs(difference)):
         raise InputError(

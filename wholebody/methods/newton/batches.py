@@ -205,22 +205,22 @@ class Slide(Batch):
         k, m = self.normals.shape[:2]
         turn = np.repeat(a[:, 3:], m, axis=0)
         normals = quat.rotate(turn, self.normals.reshape(-1, 3)).reshape(k, m, 3)
-        way = b[:, :3] + quat.rotate(b[:, 3:], self.points) - a[:, :3]
-        return turn, normals, way
+        offset = b[:, :3] + quat.rotate(b[:, 3:], self.points) - a[:, :3]
+        return turn, normals, offset
 
     def residual(self, x: Array) -> Array:  # noqa: D102
-        _, normals, way = self._parts(x)
-        result: Array = (normals @ way[:, :, None])[..., 0] - self.height
+        _, normals, offset = self._parts(x)
+        result: Array = (normals @ offset[:, :, None])[..., 0] - self.height
         return result
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
-        turn, normals, way = self._parts(x)
+        turn, normals, offset = self._parts(x)
         k, m = self.normals.shape[:2]
         result = np.empty((k, m, 14))
         result[:, :, PLACE] = -normals
         result[:, :, OTHER_PLACE] = normals
         change = quat.rotate_derivative(turn, self.normals.reshape(-1, 3)).reshape(k, m, 3, 4)
-        result[:, :, TURN] = (way[:, None, None, :] @ change)[:, :, 0]
+        result[:, :, TURN] = (offset[:, None, None, :] @ change)[:, :, 0]
         result[:, :, OTHER_TURN] = normals @ quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.points)
         return result
 

@@ -268,11 +268,11 @@ class FigureBodies:
                 q[kind.idx_q] = place.translation @ _axis(kind)
         if self.step is not None:
             start, lower, upper = self.step
-            way = np.asarray(pin.difference(self.model, start, q))
+            motion = np.asarray(pin.difference(self.model, start, q))
             # all joints by the same share: clipping them one by one would change the direction of the motion
-            room = np.where(way > 0.0, upper, -lower)
-            share = float(np.min(room / np.maximum(np.abs(way), 1e-300), initial=1.0))
-            q = pin.integrate(self.model, start, share * way)
+            room = np.where(motion > 0.0, upper, -lower)
+            share = float(np.min(room / np.maximum(np.abs(motion), 1e-300), initial=1.0))
+            q = pin.integrate(self.model, start, share * motion)
         result: Array = self.figure.clamp(q)
         return result
 

@@ -49,11 +49,11 @@ class SquaredSlacks:
         active = self.slack == 0.0
         crossing = ~active & (predicted < -1e-9)  # m or rad
         if crossing.any():
-            way = np.full(len(active), np.inf)
+            until = np.full(len(active), np.inf)
             at = np.maximum(self._at[crossing], 0.0)
-            way[crossing] = at / np.maximum(at - predicted[crossing], 1e-300)
-            first = float(way.min())
-            self.slack[way <= first + 0.01] = 0.0  # those that become zero soon after the first become active with it
+            until[crossing] = at / np.maximum(at - predicted[crossing], 1e-300)
+            first = float(until.min())
+            self.slack[until <= first + 0.01] = 0.0  # those that become zero soon after the first become active with it
             self._at = self._at + first * (predicted - self._at)
             return first, True
         self._at = predicted

@@ -179,15 +179,15 @@ class _Descent:
             except SingularSystemError:
                 return False
             fast = self._memory.propose(self._step)
-        way, share = (self._step, self._share) if fast is None else (fast, 1.0)
-        length = share * run.length(way)
-        trial = run.active_system.retract(run.x + length * way)
+        direction, share = (self._step, self._share) if fast is None else (fast, 1.0)
+        length = share * run.length(direction)
+        trial = run.active_system.retract(run.x + length * direction)
         if run.active_system.runs_into():
             run.begin(self.best)
             self._step = None
             self._memory.reset()
             return True
-        trial, length, free = run.shorten(trial, way, length)
+        trial, length, free = run.shorten(trial, direction, length)
         free = free and run.advance(trial, length)
         if free:
             run.iterate(REFINEMENT.back, goals=True, measures="keep")

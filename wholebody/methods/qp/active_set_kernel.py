@@ -135,7 +135,7 @@ def minimise(
     n, m, k = len(diagonal), len(program.target), len(program.least)
     own, pushes = face(room.work, n, m, k), room.places
     gradient = own.gradient
-    way, end, violated, speed = np.empty(n), np.empty(n), np.empty(k), np.empty(k)
+    direction, end, violated, speed = np.empty(n), np.empty(n), np.empty(k), np.empty(k)
     stack_soft(program, own)
     for i in range(n):
         x[i] = min(max(x[i], lower[i]), upper[i])
@@ -155,8 +155,8 @@ def minimise(
         if not minimise_on_face(program, active, own, m + count, rough, end):
             return used
         for i in range(n):
-            way[i] = 0.0 if at_lower[i] or at_upper[i] else end[i] - x[i]
-        if _walk(program, active, x, way, violated, speed):
+            direction[i] = 0.0 if at_lower[i] or at_upper[i] else end[i] - x[i]
+        if _line_search(program, active, x, direction, violated, speed):
             continue
         # the minimum of the face: let the bounds go that hold on the wrong side
         _differentiate(program, violated, x, gradient)
@@ -172,8 +172,10 @@ def minimise(
 
 
 @compiled(inner=True, error_model="numpy")
-def _walk(program: QuadraticProgram, active: ActiveSet, x: Array, way: Array, violated: Array, speed: Array) -> bool:
-    """Go along a way (n,) as far as the objective decreases, which bends at bounds; whether a face is left to look at.
+def _line_search(
+    program: QuadraticProgram, active: ActiveSet, x: Array, direction: Array, violated: Array, speed: Array
+) -> bool:
+    """Go along a direction (n,), bent at bounds, as far as the objective decreases; whether a face is left to look at.
 
     A bound that is met holds from then on, and the others go on: one face may meet many.
     """
@@ -181,19 +183,19 @@ def _walk(program: QuadraticProgram, active: ActiveSet, x: Array, way: Array, vi
     while True:
         longest, hit, largest = np.inf, -1, 0.0
         for i in range(len(x)):
-            largest = max(largest, abs(way[i]))
-            if abs(way[i]) > STILL:
-                room = ((upper[i] if way[i] > 0.0 else lower[i]) - x[i]) / way[i]
+            largest = max(largest, abs(direction[i]))
+            if abs(direction[i]) > STILL:
+                room = ((upper[i] if direction[i] > 0.0 else lower[i]) - x[i]) / direction[i]
                 if room < longest:
                     longest, hit = room, i
-        best = _line_minimum(program, x, way, violated, speed, longest)
+        best = _line_minimum(program, x, direction, violated, speed, longest)
         for i in range(len(x)):
-            x[i] = min(max(x[i] + best * way[i], lower[i]), upper[i])
+            x[i] = min(max(x[i] + best * direction[i], lower[i]), upper[i])
         changed = _look(program, x, violated, active)
         if best != longest or hit < 0:
             return met or (best * largest > STILL and (best != 1.0 or changed))
-        active.lower[hit], active.upper[hit] = way[hit] < 0.0, way[hit] > 0.0
-        way[hit], met = 0.0, True
+        active.lower[hit], active.upper[hit] = direction[hit] < 0.0, direction[hit] > 0.0
+        direction[hit], met = 0.0, True
 
 
 @compiled(inner=True, error_model="numpy", forceinline=True)
@@ -225,26 +227,26 @@ def _differentiate(program: QuadraticProgram, violated: Array, x: Array, gradien
 
 @compiled(inner=True, error_model="numpy")
 def _line_minimum(
-    program: QuadraticProgram, x: Array, way: Array, violated: Array, speed: Array, longest: float
+    program: QuadraticProgram, x: Array, direction: Array, violated: Array, speed: Array, longest: float
 ) -> float:
-    """The step in [0, longest] along a way (n,) from x (n,) with the least objective.
+    """The step in [0, longest] along a direction (n,) from x (n,) with the least objective.
 
     The derivative along the step is a(t) = base + rise t - sum over pushing rows of v_j s_j (l_j - c_j x - t s_j), with
-    s_j = c_j way; rows begin or cease to push where l_j - c_j x = t s_j. `speed` (k,) is room for s.
+    s_j = c_j direction; rows begin or cease to push where l_j - c_j x = t s_j. `speed` (k,) is room for s.
     """
     diagonal, linear, rows = program.diagonal, program.linear, program.rows
     target, weight, elastic = program.target, program.weight, program.elastic
     base, rise, push = 0.0, 0.0, program.elastic_weight
     for i in range(len(x)):
-        base += (diagonal[i] * x[i] + linear[i]) * way[i]
-        rise += diagonal[i] * way[i] * way[i]
+        base += (diagonal[i] * x[i] + linear[i]) * direction[i]
+        rise += diagonal[i] * direction[i] * direction[i]
     for r in range(len(target)):
-        slope = dot(rows[r], way)
+        slope = dot(rows[r], direction)
         base += weight[r] * slope * (dot(rows[r], x) - target[r])
         rise += weight[r] * slope * slope
     k = len(violated)
     for j in range(k):
-        speed[j] = dot(elastic[j], way)
+        speed[j] = dot(elastic[j], direction)
         if violated[j] > 0.0:
             base -= push[j] * speed[j] * violated[j]
             rise += push[j] * speed[j] * speed[j]

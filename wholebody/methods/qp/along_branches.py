@@ -57,17 +57,17 @@ class Along(Nearby):
     def least(self, branches: Branches, most: float) -> Look | None:
         """The free posture of least effort, if that is less than `most`; the first one where no effort counts."""
         best, measured, held, blocked = None, bool(self.nearest[1].any()), self.chain.held, -1
-        order, ways = self.chain.downhill(branches, most)
+        order, bottoms = self.chain.downhill(branches, most)
         together = 8  # of which branches are followed at once; more: less time in Python, more for what is not needed
         for begin in range(0, len(order), together):
             some = order[begin : begin + together]
-            samples, towards = branches.values[some], ways[begin : begin + together, 0].copy()
+            samples, towards = branches.values[some], bottoms[begin : begin + together, 0].copy()
             ends, efforts = self._along(samples, towards, most)
             for k, (first, last) in enumerate(efforts.tolist()):
-                if ways[begin + k, 1] >= most:
+                if bottoms[begin + k, 1] >= most:
                     return best
                 bottom = towards[k] == samples[k, held]
-                least = ways[begin + k, 1] if bottom and first < np.inf else min(first, last)
+                least = bottoms[begin + k, 1] if bottom and first < np.inf else min(first, last)
                 if least >= most or some[k] == blocked:  # a sample that is alone in its branch comes twice
                     continue
                 here = self._look(ends[k, 0], first)

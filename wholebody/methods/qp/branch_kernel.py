@@ -13,18 +13,18 @@ from wholebody.methods.qp.closed_form_kernel import BRANCHES, Arm, beside
 
 
 @compiled(error_model="numpy")
-def downhill(effort: Array, held: Array, most: float, order: Indices, ways: Array) -> int:
+def downhill(effort: Array, held: Array, most: float, order: Indices, bottoms: Array) -> int:
     """Where branches fall from their samples, the least effort first, as far as it may be less than `most`.
 
     That is the sample beside one of less effort; else its own, and a parabola's least; else one beyond limits. From a
-    sample that is alone in its branch there are two ways.
+    sample that is alone in its branch there are two bottoms.
 
     Args:
         effort: (v, 8) of the samples, inf for none.
         held: (v, 8) their values of the joint that is held; those at the ends may be turned by a whole turn.
         most: effort.
         order: (2 * v * 8,) written: places of the samples in the flattened array.
-        ways: (2 * v * 8, 2) written: the value to which each falls, and the effort there.
+        bottoms: (2 * v * 8, 2) written: the value to which each falls, and the effort there.
 
     Returns:
         How many there are.
@@ -48,11 +48,11 @@ def downhill(effort: Array, held: Array, most: float, order: Indices, ways: Arra
             for other in (towards, 2.0 * held[v, b] - towards):
                 if least < most:
                     place = count
-                    while place > 0 and ways[place - 1, 1] > least:
+                    while place > 0 and bottoms[place - 1, 1] > least:
                         order[place] = order[place - 1]
-                        copy(ways[place - 1], ways[place])
+                        copy(bottoms[place - 1], bottoms[place])
                         place -= 1
-                    order[place], ways[place, 0], ways[place, 1] = BRANCHES * v + b, other, least
+                    order[place], bottoms[place, 0], bottoms[place, 1] = BRANCHES * v + b, other, least
                     count += 1
                 if least > -np.inf:
                     break

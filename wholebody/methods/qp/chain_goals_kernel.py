@@ -164,11 +164,11 @@ def rows_of_others(chain: Chain, goals: Goals, room: Room) -> None:
             moved = support[joint, k] - support[base, k]
             room.jacobian[r, k] = moved * dot(room.wrench[r], room.columns[k]) if moved != 0 else 0.0
     for e in range(len(goals.mass_entries)):
-        r, way = goals.mass_entries[e, 0], goals.mass_tables[e]
+        r, direction = goals.mass_entries[e, 0], goals.mass_tables[e]
         for k in range(len(room.columns)):
             column, carried, rate = room.columns[k], room.moment[k + 1], 0.0
             for i in range(3):
                 j, m = (i + 1) % 3, (i + 2) % 3
                 turned = column[3 + j] * carried[1 + m] - column[3 + m] * carried[1 + j]
-                rate += way[i] * (carried[0] * column[i] + turned)
+                rate += direction[i] * (carried[0] * column[i] + turned)
             room.jacobian[r, k] = rate

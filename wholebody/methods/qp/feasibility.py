@@ -35,8 +35,8 @@ class Feasibility(Stage):
             program = self.shared.subproblem.program(here.at, here.rows, size)
             step = working_set.solve(program, here.rows.key).x
             if float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance):
-                way = self._turned_on(here, program, step, wrapped)
-                there = None if way is None else self.moved(here, way)
+                turned = self._turned_on(here, program, step, wrapped)
+                there = None if turned is None else self.moved(here, turned)
                 if there is None:
                     return self.ended(here, True, count)
                 here, history, box, last = there, [], FEASIBILITY.step, np.zeros_like(step)
@@ -71,9 +71,9 @@ class Feasibility(Stage):
         for index in np.argsort(-np.abs(pushed)).tolist():
             if ((high | low) & allowed & wide)[index] and index not in wrapped:
                 wrapped.add(index)
-                way = np.zeros(len(step))
-                way[limits.idx_v[index]] = move[index]
-                return way
+                displacement = np.zeros(len(step))
+                displacement[limits.idx_v[index]] = move[index]
+                return displacement
         return None
 
     def look(self, q: Array, longest: float = np.inf) -> Iterate:

@@ -95,17 +95,17 @@ class Stage:
         rows = self.shared.subproblem.rows(at)
         return Iterate(at, rows, self.shared.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
-    def moved(self, here: Iterate, way: Array) -> Iterate | None:
-        """Where a way (nv,) leads; None where a term of one's own is not finite there."""
-        q = np.asarray(pin.integrate(self.shared.lineariser.state.model, here.at.q, way))
+    def moved(self, here: Iterate, displacement: Array) -> Iterate | None:
+        """Where a displacement (nv,) leads; None where a term of one's own is not finite there."""
+        q = np.asarray(pin.integrate(self.shared.lineariser.state.model, here.at.q, displacement))
         try:
-            return self.look(q, float(np.abs(way).max(initial=0.0)))
+            return self.look(q, float(np.abs(displacement).max(initial=0.0)))
         except UndefinedTermError as error:
             self.shared.control.step_back(error)
             return None
 
     def look(self, q: Array, longest: float = np.inf) -> Iterate:
-        """A posture (nq,) that a way with this longest entry led to, with its rows; UndefinedTermError."""
+        """A posture (nq,) that a displacement with this longest entry led to, with its rows; UndefinedTermError."""
         raise NotImplementedError
 
     def ended(self, here: Iterate, converged: bool, count: int) -> LocalSolution:

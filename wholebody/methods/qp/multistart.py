@@ -255,8 +255,8 @@ class QPMultistart(Search):
             judged = assess(problem, self.best.q)
             if judged.optimality <= SEARCH.optimal or self.control.over:
                 return False
-            way = -share * judged.first_order.residual
-            start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, way)))
+            step = -share * judged.first_order.residual
+            start = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, self.best.q, step)))
             self.accept(self._ran(self._descent(self.settings.iterations, None, "", tolerance=0.1 * tolerance), start))
         return assess(problem, self.best.q).optimality > SEARCH.optimal
 

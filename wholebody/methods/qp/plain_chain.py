@@ -187,12 +187,12 @@ class PlainChain:
         return found, effort, order[:count]
 
     def downhill(self, branches: Branches, most: float) -> tuple[Indices, Array]:
-        """Samples (k,) from which branches fall below an effort, and ways (k, 2): see `branch_kernel.downhill`."""
+        """Samples (k,) from which branches fall below an effort, and bottoms (k, 2): see `branch_kernel.downhill`."""
         effort, count = branches.effort.reshape(-1, BRANCHES), 2 * branches.effort.size
-        order, ways = np.empty(count, dtype=np.intp), np.empty((count, 2))
+        order, bottoms = np.empty(count, dtype=np.intp), np.empty((count, 2))
         held = branches.values[:, self.held].copy().reshape(-1, BRANCHES)
-        count = branch_kernel.downhill(effort, held, most, order, ways)
-        return order[:count], ways[:count]
+        count = branch_kernel.downhill(effort, held, most, order, bottoms)
+        return order[:count], bottoms[:count]
 
     def along(
         self, goals: Goals, nearest: Array, asked: Array, samples: Array, towards: Array,

@@ -169,12 +169,12 @@ class Search(Multistart[LocalSolution]):
         Lunges to either side are as good: who is much like another is to end as that one does.
         """
         figure, far = self.problem.scene.figure, share * SEARCH.aside
-        way = np.zeros(figure.model.nv)
+        move = np.zeros(figure.model.nv)
         for side, sign in (("left_leg", 1.0), ("right_leg", -1.0)):
-            way[figure.dofs([body + side for body in figure.bodies if body + side in figure.groups])] = sign * far
-        if not way.any():
-            way = np.random.default_rng(self.settings.seed).normal(0.0, far, len(way))
-        return figure.clamp(np.asarray(pin.integrate(figure.model, q, way)))
+            move[figure.dofs([body + side for body in figure.bodies if body + side in figure.groups])] = sign * far
+        if not move.any():
+            move = np.random.default_rng(self.settings.seed).normal(0.0, far, len(move))
+        return figure.clamp(np.asarray(pin.integrate(figure.model, q, move)))
 
     def _closest(self) -> Closest:
         return Closest(self._shared, self.settings.tolerance, self._at_most(SEARCH.coming_near), problem=self.problem)

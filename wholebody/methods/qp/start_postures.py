@@ -172,9 +172,9 @@ def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | N
         push = global_depth(depth, near.normal[group.rows])
         # of pieces that overlap; more take longer to separate than other starts
         if float(np.linalg.norm(push)) <= CANCELLED * float(depth.max()) and len(group.rows) <= 16:
-            way = _way_out(workspace, near, group)
-            if way is not None:
-                return _moved(problem, workspace, q, group.joints, way)
+            shift = _way_out(workspace, near, group)
+            if shift is not None:
+                return _moved(problem, workspace, q, group.joints, shift)
     return None
 
 
@@ -196,15 +196,15 @@ def _way_out(workspace: Workspace, near: Contacts, group: _Group) -> Array | Non
     a, b = table.pairs.T
     pairs = table.pairs[(first[a] & second[b]) | (second[a] & first[b])]
     normal = near.normal[group.rows[0]]
-    way = way_out(workspace.geometry, near.placements, pairs, np.flatnonzero(first), normal)
-    return None if way is None else way * (1.0 + ROOM / float(np.linalg.norm(way)))
+    shift = way_out(workspace.geometry, near.placements, pairs, np.flatnonzero(first), normal)
+    return None if shift is None else shift * (1.0 + ROOM / float(np.linalg.norm(shift)))
 
 
-def _moved(problem: Problem, workspace: Workspace, q: Array, joints: tuple[int, int], way: Array) -> Array:
+def _moved(problem: Problem, workspace: Workspace, q: Array, joints: tuple[int, int], shift: Array) -> Array:
     """The posture with the first joint moved by `way` (3,) relative to the second, and turned little."""
     state, model, figure = workspace.state.update(q), workspace.model, problem.scene.figure
     begun = [state.data.oMi[joint].copy() for joint in joints]
-    wanted = pin.SE3(begun[0].rotation, begun[0].translation + way)
+    wanted = pin.SE3(begun[0].rotation, begun[0].translation + shift)
     joint, against = (np.full(6, each, dtype=np.intp) for each in joints)
     for _ in range(STEPS):
         here, other = (state.data.oMi[each].copy() for each in joints)

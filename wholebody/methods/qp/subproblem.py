@@ -116,8 +116,8 @@ class Subproblem:
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
         """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""
-        way = _NONE if displacement is None else displacement
-        return Violation(*self._kernel.violation(rows, self.terms.share, way))
+        x = _NONE if displacement is None else displacement
+        return Violation(*self._kernel.violation(rows, self.terms.share, x))
 
     def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
         """By how much the measures of a program decrease, to second order, with the displacement x (nv,)."""

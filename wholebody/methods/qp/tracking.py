@@ -101,14 +101,14 @@ class QPTracker(SolvingTracker):
         exact = enough < TRACKING.of_a_frame
         # a bound on speeds holds for a whole frame
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else TRACKING.programs[exact]
-        last, error, way = self.step(q), np.inf, np.inf
+        last, error, largest = self.step(q), np.inf, np.inf
         if last.path:
             return FrameStep(last.q, len(last.path) - 1, last.collisions, last.path)
         for spent in range(1, most):
             before, error = error, goal_error(self.problem, self.workspace, last.q)
-            longest, way = way, float(np.abs(last.displacement).max(initial=0.0))
+            longest, largest = largest, float(np.abs(last.displacement).max(initial=0.0))
             # what is held is missed by the square of a step, and each runs ahead of that as the one before was curved
-            curved = exact and max(longest, way) ** 2 > enough
+            curved = exact and max(longest, largest) ** 2 > enough
             met = error <= enough or error > TRACKING.worth * before
             if (met and not curved) or BUDGET.over:
                 return FrameStep(last.q, spent)

@@ -138,8 +138,8 @@ def solve(
         if j >= one_sided:
             spare = min(spare, ahead)
     asked = fixed[24] * min(1.0, left / error) if left > fixed[25] else 0.0
-    way, turn = moved(x, fixed_bodies(fixed, places, goals, columns, placement))
-    return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
+    length, turn = moved(x, fixed_bodies(fixed, places, goals, columns, placement))
+    return True, count, length, turn, worst, spare, missed, least_asked, damping, asked
 
 
 @compiled(inner=True, forceinline=True)

@@ -40,8 +40,8 @@ class Turning:
 
     def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
         """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
-        way, turn = self._kernel.moved(displacement, self.bodies(at.contacts.placements))
-        return way, turn
+        length, turn = self._kernel.moved(displacement, self.bodies(at.contacts.placements))
+        return length, turn
 
     def linearisation_error(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
         """Largest share of `unseen_by_rows` by which a pair can be nearer after `displacement` than its rows say."""

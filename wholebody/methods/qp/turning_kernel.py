@@ -80,7 +80,7 @@ def linearisation_error(
             room[c] = min(room[c], dot(rows.elastic[r], displacement) - rows.elastic_violation[r])
     worst, vectors = 0.0, np.empty((5, 3))
     for c in range(count):
-        nearer, way = np.inf, np.inf
+        nearer, length = np.inf, np.inf
         round_piece = single[pair[c, 0]] or single[pair[c, 1]]
         for side in range(2):
             # a plane that moves with one piece, and the points of the other one; a single point has no plane
@@ -93,14 +93,14 @@ def linearisation_error(
                 piece, twist[carrier], change[carrier], near.normal[c], 1.0 - 2.0 * side, seen.off, vectors
             )
             if bend < nearer:
-                nearer, way = bend, gone
-        nearer += seen.off * way
+                nearer, length = bend, gone
+        nearer += seen.off * length
         unseen = min(max(asked[c], seen.least), seen.most)
         if nearer <= unseen:
             continue
         spare = distance[c] - asked[c]
         beyond = seen.band if spare <= seen.lever else 0.0
-        if room[c] < seen.room * nearer or (not round_piece and spare + beyond < way):
+        if room[c] < seen.room * nearer or (not round_piece and spare + beyond < length):
             worst = max(worst, nearer / unseen)
     return worst
 
@@ -177,7 +177,7 @@ def _seen_from(
         carrier_square += carrier[3 + i] * carrier[3 + i]
         spin_square += spin[i] * spin[i]
     far = reach if turn_square + spin_square > 0.0 else 0.0
-    way = np.sqrt(speed_square) + np.sqrt(turn_square) * far
+    length = np.sqrt(speed_square) + np.sqrt(turn_square) * far
     # the bow itself turns with the bodies on the way
     aside = (off + np.sqrt(own_square) + np.sqrt(carrier_square)) * np.sqrt(bow_square)
-    return way, 0.5 * (max(towards, 0.0) + aside + (np.sqrt(spin_square) + turn_square) * far)
+    return length, 0.5 * (max(towards, 0.0) + aside + (np.sqrt(spin_square) + turn_square) * far)
