@@ -15,7 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Run, keep_back
 from wholebody.motion.faults import Faults, depths_between
 from wholebody.motion.measures import MotionBounds, excess
-from wholebody.motion.trajectory.window_run import USUAL, ClipRun
+from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
 
@@ -66,7 +66,7 @@ def smoothed(run: Run, q: Array, asked: MotionBounds) -> tuple[Array, int]:
     if not beyond.any():
         return q, 0
     found = run.faults(terms.q)
-    for time in (USUAL, 0.2, 0.4):  # s: the smoothness of the method "trajectory", and more where its jerk is beyond
+    for time in (None, 0.2, 0.4):  # s: the smoothness of the method "trajectory", and more where its jerk is beyond
         windows = ClipRun(run, terms.q, time)
         for window in run.windows(beyond, 0.5):
             frames = slice(window.first, window.end)

@@ -105,7 +105,7 @@ def test_attempts_that_end_early_are_gone_on_with(
     def once(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
         found, early = run(self, x, *given), len(given) > 3 and given[3]
         runs.append((x, early, found.x))
-        return found._replace(end=End.EARLY, worst=1.0) if early else found
+        return found._replace(end=End.EARLY) if early else found
 
     monkeypatch.setattr(WindowProgram, "run", once)
     wb.avoid(clip, scene, method="trajectory")

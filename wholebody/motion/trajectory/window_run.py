@@ -19,7 +19,9 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import millimetres
 from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.avoider import Run, followed
+from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, deepest_shares, dipping
+from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import MET, NEAREST, Node, NodeEvaluator
@@ -28,7 +30,10 @@ from wholebody.motion.trajectory.sqp import FAR, End, WindowProgram
 from wholebody.motion.windows import Window
 
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
-USUAL = 0.1  # s: smoothness; where it is shorter, more attempts end on a wrong side
+
+
+FIRST = 0.1  # s: smoothness of the first answer; where it is shorter, more attempts end on a wrong side
+JERK = 1.2  # parts of the original's; an answer with more is made smoother
 ITERATIONS = 40  # most steps of one run; a step takes one to three programs
 
 
@@ -95,10 +100,10 @@ class ClipRun:
     """Frees windows of one clip."""
 
     def __init__(
-        self, run: Run, reference: Array, time: float, rate: float | None = 1.0,
+        self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
         loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
-        """Take postures (n, nq), the spread of a push [s], the `rate` of speeds, a trust region `near`."""
+        """Take postures (n, nq), the spread of a push [s] or None, the `rate` of speeds, a trust region `near`."""
         self._run, self._reference = run, reference
         self._time, self._rate, self._loads, self._near = time, rate, loads, near
 
@@ -110,7 +115,7 @@ class ClipRun:
         # with `whole` false the last frame of a part is free; what ended early goes on only if `patient`
         around = begun if around is None else around
         own = self._of(window, found, cancel, around, (window.first > 0, whole and window.end < len(self._reference)))
-        objective = self._objective(own)
+        objective = self._objective(own, FIRST if self._time is None else self._time)
         starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
             begins = self._starts(own, found.depths)
@@ -139,6 +144,8 @@ class ClipRun:
         if not best.free:
             dip = f", and {best.dipping} motions between frames dip" if best.dipping else ""
             missed = f"{millimetres(best.worst)} or mrad are missed{dip}"
+        elif self._time is None and self._loads is None:  # torques come of accelerations: these stay least
+            best = self._again(best, own)
         changed = np.abs(best.x).max(axis=1) > 1e-9  # rad, m
         q = own.chart.original.copy()
         q[changed] = own.chart.postures(best.x)[changed]
@@ -166,11 +173,33 @@ class ClipRun:
             return np.zeros(model.nv)
         return np.asarray(pin.difference(model, self._reference[frame], q[frame]))
 
-    def _objective(self, own: _Window) -> Objective:
+    def _objective(self, own: _Window, time: float) -> Objective:
         window, weights = own.window, np.ones(self._run.workspace.model.nv)
         beyond = (window.first - 2, window.first - 1, window.end, window.end + 1)
         ends = np.array([self._away(own.around, frame) for frame in beyond])
-        return Objective(len(window), weights, self._time, self._run.terms.dt, own.seams, ends)
+        return Objective(len(window), weights, time, self._run.terms.dt, own.seams, ends)
+
+    def _again(self, found: _Attempt, own: _Window) -> _Attempt:
+        """An answer once more, smoother where its jerk is not allowed, else less smooth and nearer to the original."""
+        jerk, square = self._jerk(own, found.x), float((found.x**2).sum())
+        rough = jerk > JERK
+        # acceleration that costs less than a tenth of the squared deviation leaves little to gain
+        if not rough and found.objective < 1.1 * 0.5 * square:
+            return found
+        objective = self._objective(own, FIRST * (1.5 if rough else 0.4))
+        other = self._attempt(found, own, objective, _Way(NEARLY))
+        if other is None or not other.free:
+            return found
+        better = self._jerk(own, other.x) <= JERK and (rough or (other.x**2).sum() < square)
+        return other if better else found
+
+    def _jerk(self, own: _Window, x: Array) -> float:
+        """Of the frames that deviations (n, nv) of a window change the jerk of, in parts of the original's."""
+        window, figure, dt = own.window, self._run.scene.figure, self._run.terms.dt
+        first, end = max(0, window.first - 3), min(len(self._reference), window.end + 3 * own.seams[1])
+        before, after = self._reference[first:end], own.around[first:end].copy()
+        after[window.first - first : window.end - first] = own.chart.postures(x)
+        return jerk_ratio(Clip(figure, before, dt), Clip(figure, after, dt))
 
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
         """Deviations (n, nv) to begin with: none; followed from the deepest frame and from both ends."""
