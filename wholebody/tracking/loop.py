@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -30,6 +31,9 @@ from wholebody.tracking.qp_strategy import CLEARANCE, Attraction, QPStrategy, we
 from wholebody.tracking.recording import Recording
 
 OVERLAPS = ("qp", "ccd")
+
+SHARES = (0.5, 0.25)
+"""Shares of the motion that are tried if the whole is not free: an arc leaves a surface by the square of the share."""
 
 
 class FrameLoop(NotCopyable):
@@ -154,13 +158,15 @@ class FrameLoop(NotCopyable):
         )  # fmt: skip
 
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
-        """The first posture to which the motion is free, or the posture shown."""
+        """The first posture to which the motion is free; else a share of the motion, or the posture shown."""
         # Algorithm 1, step 4. Motions up to a contact are rejected, because they would creep into it.
         if resolution.swept:
             return resolution
         began = time.perf_counter()
+        nearest = resolution.candidates[-1]
+        parts = (np.asarray(pin.interpolate(self.scene.model, self.shown, nearest, share)) for share in SHARES)
         note, contact = resolution.note, None
-        for q in resolution.candidates:
+        for q in itertools.chain(resolution.candidates, parts):
             contact = self.scene.sweep(self.shown, q, self._strategy.sweep_tolerance)
             if contact is None:
                 break
@@ -177,8 +183,10 @@ class FrameLoop(NotCopyable):
     ) -> tuple[Resolution, tuple[Collision, ...]]:
         """The first posture free of things that move, or the least deep, and what was not avoided."""
         began, start = time.perf_counter(), (0.0, self.shown)
+        nearest = resolution.candidates[-1]
         paths: list[tuple[tuple[float, Array], ...]] = [resolution.path] if resolution.path else []
-        paths += [(start, (1.0, q)) for q in (*resolution.candidates, self.shown)]
+        ends = [*resolution.candidates, *(pin.interpolate(self.scene.model, self.shown, nearest, s) for s in SHARES)]
+        paths += [(start, (1.0, np.asarray(q))) for q in [*ends, self.shown]]
         best, found, least = paths[0], tuple[Collision, ...](), np.inf
         for way in paths:
             collisions = motion.collisions(way)
