@@ -129,9 +129,10 @@ def avoid_many(
     batch = _Batch(sources, figure, BatchTable(checks.path(folder, f"{what}: folder")), running)
     marks, faults = batch.originals()
     asked = [
-        _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
+        _Asked(AvoidedCase(name, wears, way, asked=fingerprint(marks[name], one, mesh, method, held)), one, method)
         for name in sources
         for wears, one in worn.items()
+        for mesh in [read_bytes(one, "mesh") if isinstance(one, str) and is_file(one) else None]
         for way, method in avoiders.items()
     ]
     return batch.freed(asked, faults, held)
@@ -319,8 +320,3 @@ def _mark(source: Clip | Path, figure: Figure | None) -> str:
         return fingerprint(read_bytes(source, "motion"), figure)
     except WholebodyError as error:
         return fingerprint(str(error))
-
-
-def _fingerprint(mark: str, worn: Worn, method: Avoider, held: AvoidOptions) -> str:
-    bytes_of_mesh = read_bytes(worn, "mesh") if isinstance(worn, str) and is_file(worn) else None
-    return fingerprint(mark, worn, bytes_of_mesh, method, held)

@@ -133,7 +133,9 @@ def resting(
             stays = stays or (not hangs and _came_down(places[:, k, 2], run, low, dt))
             rest = [each for each in range(len(points)) if each != k]
             rest = [each for each in rest if points[each].foot != points[k].foot] or rest
-            stays = stays or _bears(run, dt, found, marks[:, rest])
+            # nothing that is found, and no slow point of the other foot, bears
+            alone = ~(found[run.first : run.end].any(axis=1) | marks[run.first : run.end, rest].any(axis=1))
+            stays = stays or bool(alone.sum() * dt > WAITED)
         seen.add(number)
         if stays:
             accepted[number] = True
@@ -221,12 +223,6 @@ def _unloaded(
         here = slice(common.start - run.first, common.stop - run.first)
         loads[here] = np.minimum(loads[here], along / np.maximum(np.einsum("ni,ni->n", way, way), NARROW**2))
     return bool((loads < LOADED).all())
-
-
-def _bears(run: Window, dt: float, found: Mask, others: Mask) -> bool:
-    """Whether nothing that is `found` (n, p), and no slow point of the other foot (n, m), bears during a rest."""
-    alone = ~(found[run.first : run.end].any(axis=1) | others[run.first : run.end].any(axis=1))
-    return bool(alone.sum() * dt > WAITED)
 
 
 class LiveRests:

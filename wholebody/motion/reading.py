@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,12 @@ def _say(motion: SkeletonMotion, path: Path) -> None:
         warn(
             f"{one_line(path.name)}: its frames are {motion.dt:g} s apart, and speeds are of that; recordings have 20 "
             "or more a second: if it has, correct it with dataclasses.replace(motion, dt=1 / 30)"
+        )
+    rate = re.search(r"(?<![\d.])(\d{2,3})[ _-]?(fps|hz)", path.stem.lower()) if path.suffix.lower() == ".bvh" else None
+    if rate and float(rate[1]) > 0.0 and not 0.8 < float(rate[1]) * motion.dt < 1.25:
+        warn(
+            f"{one_line(path.name)}: its name says {rate[1]} frames a second, and its frames are {motion.dt:.3g} s "
+            f"apart; if the name is right, correct it with dataclasses.replace(motion, dt=1 / {int(rate[1])})"
         )
     steps = np.linalg.norm(np.diff(motion.positions[:, 0], axis=0), axis=1)
     jumps = np.flatnonzero(steps > JUMP * motion.dt * longest_way(motion.parents, motion.offsets))

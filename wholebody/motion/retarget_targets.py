@@ -196,7 +196,9 @@ def _turns(
     for side in ("left", "right"):
         turn = _hand_turn(motion, joint, side, axes)
         if turn is not None:
-            turns[f"{side}_hand"] = turn @ _hand_axes(own, side).T @ turned[f"{side}_hand"]
+            inward = np.array([0.0, -1.0 if side == "left" else 1.0, 0.0])  # as palms face in the neutral posture
+            fingers = own.way(f"{side}_wrist", f"{side}_hand")
+            turns[f"{side}_hand"] = turn @ _frame(fingers, inward).T @ turned[f"{side}_hand"]
     return turns
 
 
@@ -306,13 +308,6 @@ def _pelvis(source: _Body, motion: SkeletonMotion) -> Array:
     flat = np.abs(np.linalg.det(found) - 1.0) > RIGID
     found[flat] = motion.rotations[flat, 0]
     return found
-
-
-def _hand_axes(own: _Body, side: str) -> Array:
-    """Fingers, side and palm of the figure's hand in its neutral posture, columns (3, 3): palms face inwards."""
-    fingers = own.way(f"{side}_wrist", f"{side}_hand")
-    inward = np.array([0.0, -1.0 if side == "left" else 1.0, 0.0])
-    return _frame(fingers, inward)
 
 
 def _hand_turn(motion: SkeletonMotion, joint: dict[str, int], side: str, axes: Array) -> Array | None:

@@ -118,7 +118,7 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
     centers, radii, uncovered, outside = min(fits, key=lambda fit: UNCOVERED * fit[2] + fit[3])
     corners = np.vstack([grid.inside, vertices])
     parts = np.array_split(corners, max(1, len(corners) // 4000))  # all at once would take memory
-    beyond = max(_gap(part, centers, radii).max() for part in parts)
+    beyond = max((np.linalg.norm(part[:, None] - centers, axis=2) - radii).min(axis=1).max() for part in parts)
     depth = _signed_depth(centers, vertices, faces)
     return SphereFilling(
         Spheres(centers, radii),
@@ -235,11 +235,6 @@ def _best_radius(inside: Array, outside: Array, grid: _Grid) -> float:
     if not len(gained) or gained.max() <= 0.0:
         return least
     return max(float(distance[order[int(np.argmax(gained))]]), least)
-
-
-def _gap(points: Array, centers: Array, radii: Array) -> Array:
-    """(k,) distance of points from the nearest sphere; negative inside."""
-    return np.asarray((np.linalg.norm(points[:, None] - centers, axis=2) - radii).min(axis=1))
 
 
 def _signed_depth(points: Array, vertices: Array, faces: Faces) -> Array:

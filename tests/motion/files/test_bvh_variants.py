@@ -207,3 +207,18 @@ def test_a_body_that_jumps_as_none_can_is_told(far: float, told: bool, tmp_path:
         read(tmp_path, text(hips(), rows))
     sentence = "Hips jumps by 0.8 m from frame 4 to the next; if recordings were joined there, take them apart by"
     assert any(f"{sentence} motion.part(0, 5) and motion.part(5, 8)" in str(each.message) for each in said) == told
+
+
+@pytest.mark.parametrize(("name", "told"), [("02_01_60fps", True), ("walk 100Hz", False), ("take_2", False)])
+def test_a_name_that_says_another_rate_of_frames_is_told(
+    name: str, told: bool, tmp_path: Path, rows: np.ndarray
+) -> None:
+    """A published set of walks at 60 frames a second says in each file that its frames are 0.0667 s apart."""
+    rows[:, :3] = 0.0
+    (tmp_path / f"{name}.bvh").write_text(text(hips(), rows))  # 0.01 s
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read_skeleton(tmp_path / f"{name}.bvh")
+    sentence = "its name says 60 frames a second, and its frames are 0.01 s apart"
+    assert any(sentence in str(each.message) for each in said) == told
+    assert told or not any("its name says" in str(each.message) for each in said)

@@ -115,8 +115,7 @@ def _begins_with_rest(angles: Array) -> bool:
     if not (size[0] >= still).any():
         return bool((size[1] >= still).any())
     moving = np.ptp(angles[1:], axis=0) >= still
-    # a tenth of the angles that change later turn in the rest postures of CMU, nine tenths in recorded frames; in those
-    # that were brought onto another skeleton they turn a little
+    # a tenth of the angles that change later turn more than a little in CMU's rest postures, nine tenths in others
     turns = size[0] >= np.maximum(still, 0.1 * np.median(size[1:], axis=0))
     if len(angles) < 3 or not moving.any() or turns[moving].mean() >= 0.25:
         return False

@@ -184,7 +184,9 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
         raise FileFormatError(f"{place}: the column {twice[0]} occurs twice; leave one out")
     missing = [name for name in wanted if name not in names]
     roots = [
-        {name.removesuffix(one) + column for column in ROOT_COLUMNS} for name in missing if (one := _of_root(name))
+        {name.removesuffix(one) + column for column in ROOT_COLUMNS}
+        for name in missing
+        if (one := name.rpartition("/")[2]) in ROOT_COLUMNS
     ]
     if TIME in missing:
         lacked = [TIME]
@@ -196,12 +198,6 @@ def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
         more = f" and {len(lacked) - 4} more" if len(lacked) > 4 else ""
         raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}{more}; add them")
     return names
-
-
-def _of_root(name: str) -> str | None:
-    """What of a free root a column has; None of a joint's."""
-    column = name.rpartition("/")[2]
-    return column if column in ROOT_COLUMNS else None
 
 
 def _decimals(time: str) -> int:
