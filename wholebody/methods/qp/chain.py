@@ -296,11 +296,12 @@ class Descents:
 
         It is sought from the sample that overlaps least, and from ends of the first seeds that are free.
         """
-        gaps = np.array([self._gaps(self.chain.posture(each, self.asked.at)) for each in inside]).reshape(-1, 2)
-        room = self.workspace.model.nv > len(self.start) and (gaps[:, 1] >= 0.0).any()  # other joints may make it
-        # inequalities reject what is nearest; with such a tolerance postures farther from the goal would do
-        if room or self.asked.bounded or self.settings.tolerance > NEARBY:
+        # inequalities and terms of one's own reject what is nearest; with such a tolerance farther postures would do
+        if self.asked.bounded or self.asked.own or self.settings.tolerance > NEARBY:
             return None
+        gaps = np.array([self._gaps(self.chain.posture(each, self.asked.at)) for each in inside]).reshape(-1, 2)
+        if self.workspace.model.nv > len(self.start) and (gaps[:, 1] >= 0.0).any():
+            return None  # other joints may make room
         seeds, at = next(self.chain.seeds(self.start, self.settings.seed, SEEDS.together)), self.asked.at
         # All of them, although some may meet the goals inside of things.
         found, _ = self._descended(seeds, how_far(self.settings, len(seeds), others=True))
